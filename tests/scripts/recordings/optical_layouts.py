@@ -4,8 +4,18 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tests.scripts.recordings.layouts import LEFT, NUMBERS, RIGHT, SECONDS, Layout, flat, quaternions, rows
-from tests.scripts.recordings.logs import COUNT, Motion
+from tests.scripts.recordings.layouts import (
+    COUNT,
+    LEFT,
+    NUMBERS,
+    RIGHT,
+    SECONDS,
+    Layout,
+    Motion,
+    flat,
+    quaternions,
+    rows,
+)
 
 MOTIVE = (
     "Format Version;1.23;Take Name;T;Export Frame Rate;90.0;Rotation Type;{};Length Units;{}\n\n"
@@ -53,53 +63,53 @@ def qualisys(nine: Callable[[np.ndarray], np.ndarray], timed: bool, euler: str =
 
 
 TWO = ("Tool", "Cup")
+VICONS = ("Tool:Tool", "Cup:Cup")
+QUATERNIONS = motive("Quaternion", quaternions(), "XYZW")
+WITH_PARENTS = (
+    motive("Quaternion", quaternions(), "XYZW", "Inches")
+    .replace(";Type;", ";;")
+    .replace(";Name;", ";;")
+    .replace(";ID;", ";;")
+    .replace("\n;;;Rot", "\n;Parent" + ";" * 8 + "\n;;;Rot")
+    .replace("Time (Seconds)", "Time")
+)
+
+
+def by_columns(table: np.ndarray) -> np.ndarray:
+    return table.transpose(0, 2, 1)
+
+
 OPTICAL: dict[str, Layout] = {
-    "Motive": Layout("take.csv", motive("Quaternion", quaternions(), "XYZW").replace(";", ","), bodies=("Tool",)),
+    "Motive": Layout(QUATERNIONS.replace(";", ","), bodies=("Tool",)),
     "Motive with semicolons and decimal commas": Layout(
-        "take.csv", motive("Quaternion", quaternions(), "XYZW", "Millimeters").replace(".", ","), bodies=("Tool",)
+        motive("Quaternion", quaternions(), "XYZW", "Millimeters").replace(".", ","), bodies=("Tool",)
     ),
-    "Motive with tabs": Layout(
-        "take.tsv", motive("Quaternion", quaternions(), "XYZW").replace(";", "\t"), bodies=("Tool",)
-    ),
-    "Motive's bones": Layout("take.csv", motive("Quaternion", quaternions(), "XYZW", asset="Bone"), bodies=("Tool",)),
-    "Motive with parents, without names of rows, in inches": Layout(
-        "take.csv",
-        motive("Quaternion", quaternions(), "XYZW", "Inches")
-        .replace(";Type;", ";;")
-        .replace(";Name;", ";;")
-        .replace(";ID;", ";;")
-        .replace("\n;;;Rot", "\n;Parent" + ";" * 8 + "\n;;;Rot")
-        .replace("Time (Seconds)", "Time"),
-        bodies=("Tool",),
-    ),
-    "Motive's angles": Layout(
-        "take.csv", motive("YXZ", LEFT.turns.as_euler("YXZ", degrees=True), "YXZ"), bodies=("Tool",)
-    ),
+    "Motive with tabs": Layout(QUATERNIONS.replace(";", "\t"), "take.tsv", bodies=("Tool",)),
+    "Motive's bones": Layout(motive("Quaternion", quaternions(), "XYZW", asset="Bone"), bodies=("Tool",)),
+    "Motive with parents, without names of rows, in inches": Layout(WITH_PARENTS, bodies=("Tool",)),
+    "Motive's angles": Layout(motive("YXZ", LEFT.turns.as_euler("YXZ", degrees=True), "YXZ"), bodies=("Tool",)),
     "Vicon": Layout(
-        "take.csv",
         vicon(lambda motion: quaternions(motion=motion), "RX;RY;RZ;RW;TX;TY;TZ", "").replace(";", ","),
-        bodies=("Tool:Tool", "Cup:Cup"),
+        bodies=VICONS,
         counted=True,
     ),
     "Vicon's angles": Layout(
-        "take.csv",
         vicon(lambda motion: motion.turns.as_euler("XYZ"), _six, "rad", "Segments"),
-        {"euler": "XYZ"},
-        ("Tool:Tool", "Cup:Cup"),
-        True,
+        said={"euler": "XYZ"},
+        bodies=VICONS,
+        counted=True,
     ),
     "Vicon behind trajectories": Layout(
-        "take.csv",
         "Trajectories\n50\n;;A:B\nFrame;Sub Frame;X;Y;Z\n;;mm;mm;mm\n1;0;1;2;3\n\n"
         + vicon(lambda motion: motion.turns.as_euler("XYZ", degrees=True), _six, "deg")
         + "\nDevices\n1000\n",
-        *({"euler": "XYZ"}, ("Tool:Tool", "Cup:Cup"), True),
+        said={"euler": "XYZ"},
+        bodies=VICONS,
+        counted=True,
     ),
-    "Qualisys": Layout("take.tsv", qualisys(lambda table: table.transpose(0, 2, 1), True), bodies=TWO),
-    "Qualisys with angles of its own": Layout(
-        "take.tsv", qualisys(lambda table: table.transpose(0, 2, 1), True, "ZXY"), bodies=TWO, warned=True
-    ),
+    "Qualisys": Layout(qualisys(by_columns, True), "take.tsv", bodies=TWO),
+    "Qualisys with angles of its own": Layout(qualisys(by_columns, True, "ZXY"), "take.tsv", bodies=TWO, warned=True),
     "Qualisys row by row, without times": Layout(
-        "take.tsv", qualisys(lambda table: table, False), bodies=TWO, counted=True
+        qualisys(lambda table: table, False), "take.tsv", bodies=TWO, counted=True
     ),
 }

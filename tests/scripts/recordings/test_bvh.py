@@ -146,28 +146,3 @@ def test_the_poses_are_those_of_blenders_importer(write, seed: int) -> None:
     finally:
         bpy.ops.preferences.addon_disable(module="io_anim_bvh")
         bpy.ops.wm.read_factory_settings(use_empty=True)
-
-
-@pytest.mark.parametrize(
-    ("text", "line", "problem"),
-    [
-        ("", 1, "the file ends where HIERARCHY is expected"),
-        (ARM.split("MOTION")[0], 16, "the file ends where MOTION is expected"),
-        (ARM.replace("}\nMOTION", "MOTION"), 15, "a } is missing before MOTION"),
-        (ARM.replace("}\nMOTION", "}\n}\nMOTION"), 16, "'}' is out of place"),
-        (ARM.replace("JOINT Elbow", "ROOT Elbow"), 6, "'ROOT' is out of place"),
-        (ARM.replace("2.0 0.0 0.0", "2.0 0.0"), 9, "'CHANNELS' where a number of the OFFSET is expected"),
-        (ARM.replace("CHANNELS 3 Z", "CHANNELS 3 Q"), 9, "'Qrotation' is not a channel"),
-        (ARM.replace("CHANNELS 3 Z", "CHANNELS 3 X"), 9, "a channel occurs twice in a joint"),
-        (ARM.replace("Frames: 2", "Frames: two"), 17, "'Frames: two' where Frames: and a positive number are expected"),
-        (ARM.replace("1 5 0  90", "1 5 0  9O").rstrip(), 20, "Shoulder Zrotation is '9O', not a number"),
-        (f"{ARM}2 5 0  90 0 0  -91 0", 21, "8 columns where 9 are needed; delete this line if it is damaged"),
-        ("HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n0\n", 6, "no joint has CHANNELS"),
-        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 50_000, 2, "more than 500 joints hang on one another; export a"),
-        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {}" * 50_000, 2, "more than 3000 joints; export fewer, such as one bod"),
-    ],
-)
-def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str | bytes, line: int | None, problem: str) -> None:
-    told_line, message = refusal(write("arm.bvh", text))
-    assert message.startswith(problem)
-    assert told_line == line

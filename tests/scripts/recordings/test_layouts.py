@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import rotate
@@ -11,7 +10,7 @@ from rigid_motion_batch.cli.reduce import main as reduce_main
 from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
 from rigid_motion_batch.recordings.clip_reading import read_source
 from rigid_motion_batch.recordings.inspecting import inspect
-from tests.scripts.recordings.layouts import LAYOUTS, LEFT, RIGHT
+from tests.scripts.recordings.layouts import LAYOUTS, LEFT, RIGHT, assert_is_the_motion
 from tests.scripts.recordings.optical_layouts import OPTICAL
 from tests.scripts.recordings.written_layouts import WRITTEN
 
@@ -24,11 +23,7 @@ def test_every_layout_is_the_motion(write, name: str) -> None:
     recording = read_trajectories(f"{write(layout.name, layout.text)}:*", ReadingOptions(**layout.said))
     assert tuple(one.name for one in recording.trajectories) == layout.bodies
     for one, motion in zip(recording.trajectories, (LEFT, RIGHT), strict=False):
-        np.testing.assert_allclose(one.times - one.times[0], layout.seconds, atol=layout.within)
-        np.testing.assert_allclose(one.poses.positions * one.metres_per_unit, motion.positions, atol=1e-9)
-        turns = Rotation.from_quat(one.poses.quaternions, scalar_first=True)
-        assert (turns.inv() * motion.turns).magnitude().max() < 1e-7
-        assert one.poses.scales is None
+        assert_is_the_motion(one, motion, layout.seconds, clock=layout.within)
         assert bool(one.warnings) == layout.warned, one.warnings
 
 
@@ -38,6 +33,7 @@ SAID = {
     "OpenVINS under names": "'q4' is taken for w",
     "PX4": "'q[0]' is taken for w; times are those of 'timestamp' and not of 'timestamp_sample'",
     "rows of positions and of rotations in turn": "positions and rotations stand in different rows",
+    "a body that lacks an axis": "'left' is left out, as it has no column y",
     "VINS": "the first of the four of a rotation is taken for w; if it is the other way round: --columns qx=5,",
 }
 
@@ -80,28 +76,17 @@ def test_cameras_look_along_y_of_the_object_with_z_above(write, name: str) -> No
     np.testing.assert_array_equal(clip.in_blender(still).positions / clip.metres_per_unit, [(0.0, 0.0, 1.0)])
 
 
-def about(axis: int, angle: float) -> np.ndarray:
-    """Return a rotation matrix in Qualisys's sense: clockwise when looking along the axis."""
-    result, (one, other) = np.eye(3), [(axis + 1) % 3, (axis + 2) % 3]
-    result[one, one] = result[other, other] = np.cos(angle)
-    result[other, one], result[one, other] = np.sin(angle), -np.sin(angle)
-    return result
-
-
-@pytest.mark.parametrize("by_rows", [False, True])
-def test_a_body_of_qualisys_is_turned_by_roll_then_pitch_then_yaw(write, by_rows: bool) -> None:
-    """R = Rx Ry Rz takes points of the body to the room, as in QTM's manual, in either order of Rot[0] to Rot[8]."""
-    angles = np.radians([[30.0, 20.0, 10.0], [-70.0, 40.0, 110.0], [5.0, -60.0, -20.0]])
-    turns = np.array([about(0, roll) @ about(1, pitch) @ about(2, yaw) for roll, pitch, yaw in angles])
-    header = "NO_OF_FRAMES\t3\nNO_OF_BODIES\t1\nFREQUENCY\t100\nBODY_NAMES\tTool\n"
-    columns = "\t".join(["X", "Y", "Z", "Roll", "Pitch", "Yaw", "Residual", *(f"Rot[{place}]" for place in range(9))])
-    written = (turns if by_rows else turns.transpose(0, 2, 1)).reshape(3, 9)
-    table = np.hstack((np.arange(9.0).reshape(3, 3), np.degrees(angles), np.zeros((3, 1)), written))
-    text = "".join("\t".join(map("{:.5f}".format, row)) + "\n" for row in table)
-    (body,) = read_trajectories(write("take.tsv", f"{header}{columns}\n{text}")).trajectories
-    found = Rotation.from_quat(body.poses.quaternions, scalar_first=True).as_matrix()
-    np.testing.assert_allclose(found, turns, atol=2e-5)
-    assert body.warnings == ()
+def test_of_motive_bones_are_taken_by_name_and_poses_in_the_space_of_a_parent_are_told(write) -> None:
+    both = str(OPTICAL["Motive"].text).replace("Meters\n", "Meters,Coordinate Space,Local\n").splitlines()
+    for row, name in {2: "Bone", 3: "Hip", 4: "7", 5: None, 6: None}.items():
+        cells = both[row].split(",")
+        both[row] += "," + ",".join(cells[2:9] if name is None else [name] * 7)
+    both[7:] = [line + "," + ",".join(line.split(",")[2:9]) for line in both[7:]]
+    source = write("take.csv", "\n".join(both))
+    (hip,), (tool,) = (read_trajectories(f"{source}{body}").trajectories for body in (":Hip", ""))
+    assert (hip.name, tool.name) == ("Hip", "Tool")
+    np.testing.assert_array_equal(hip.poses.positions, tool.poses.positions)
+    assert "Coordinate Space: Global" in str(tool.warnings)
 
 
 SOME = ("TUM", "KITTI", "w first, by numbers", "PlotJuggler", "COLMAP", "A-Frame", "Qualisys", "angles zxy in rad")

@@ -1,7 +1,5 @@
-"""Tests of logs in common spellings: each reads as the recorded motion, or the error says what to do."""
+"""Tests of logs: common spellings of columns are the recorded motion, numbers are exact, dates are seconds."""
 
-import re
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,205 +7,109 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_motion_batch.recordings import ReadingOptions, read_clips, read_trajectories
-from tests.scripts.recordings import logs
-from tests.scripts.recordings.logs import MOTIONS, assert_is_the_motion, log, names, spellings
+from rigid_motion_batch.recordings import ReadingOptions, Trajectory, read_trajectories
+from rigid_motion_batch.recordings.plausibility import MIN_MIXED_SAMPLES
+from tests.scripts.recordings.layouts import (
+    COUNT,
+    LEFT,
+    MICROSECONDS,
+    MOTIONS,
+    SECONDS,
+    Motion,
+    angles,
+    assert_is_the_motion,
+    csv,
+    names,
+)
 from tests.thoroughness import tried
 
+EPOCH = 1_700_000_000_000_000
+"""Microseconds from 1970 to a day in 2023."""
 
-def read_one(source: str, **options: object) -> object:
+TIMES = {
+    "s": "t;T;time;Time;timestamp;TimeStamp;Time (s);t [s];t_s;time_since_start_seconds;elapsed time;seconds;ts",
+    "ms": "t [ms];t (ms);timestamp_ms;Time (ms);timestampMs;TimestampMS;time_in_milliseconds;ms;unix time (ms)",
+    "us": "t_us;timestamp (us);time [\u00b5s];timeMicroseconds",
+    "ns": "timestamp_ns;t [ns];Time_ns;header.stamp (ns)",
+}
+"""Column names by unit. {} is an axis, {!} an axis as a capital letter."""
+
+POSITIONS = (
+    "{};{!};p{};t{};pos_{};pos{!};Pos{!};POS_{!};position.{};position_{};Position {!};position[{}];m_LocalPosition.{};"
+    "transform.translation.{};loc_{};Pos.{};field.pose.position.{};worldPosition{!};{} position"
+)
+QUATERNIONS = (
+    "q{};Q{!};rot_{};Rot{!};rotation.{};quat_{};quaternion.{};orientation.{};r{};Rotation {!};m_LocalRotation.{};q_{};"
+    "field.pose.orientation.{};rotation_quat_{};q[{}]"
+)
+EULERS = "r{};rot_{};Rot{!};euler_{};eulerAngles.{};rotation.{};orientation {};localEulerAngles.{}"
+LENGTHS = {"m": ";_m; (m); [m]", "cm": "_cm; (cm); [cm]; [centimeters]", "mm": "_mm; (mm)"}
+ANGLES = {"deg": "_deg; [deg]; (degrees)", "rad": "_rad; [rad]"}
+DEVICES = "device;Device;hand;Controller;tracker_id;node name;body"
+EXTRAS = "frame;button;velocity_x;velocity_y;velocity_z;delta_time;confidence;angular_velocity.x;hp"
+
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+HEADER = "t,x,y,z,qx,qy,qz,qw"
+
+
+def read_one(source: str, **options: object) -> Trajectory:
     (trajectory,) = read_trajectories(source, ReadingOptions(**options)).trajectories
     return trajectory
 
 
-def test_columns_may_be_named_one_by_one(write) -> None:
-    source = write("take.csv", log(["when", "a", "b", "c", "d", "e", "f", "g"]))
-    named = zip(("t", "x", "y", "z", "qx", "qy", "qz", "qw"), ("When", "a", "b", "c", "d", "e", "f", "g"), strict=True)
-    assert_is_the_motion(read_one(source, columns=tuple(named)), MOTIONS["left"])
-
-
-def euler_log(header: Sequence[str], order: str, degrees: bool) -> str:
-    motion = MOTIONS["left"]
-    angles = motion.turns.as_euler(order, degrees=degrees)
-    by_axis = angles[:, np.argsort(list(order.lower()))]
-    rows = zip(logs.time_texts("s", 0), logs.pose_texts(motion, 1.0, by_axis), strict=True)
-    return logs.written(header, [[time, *pose] for time, pose in rows])
-
-
-def test_roll_pitch_and_yaw_are_read_where_it_is_said_which_is_which(write, refusal) -> None:
-    source = write("take.csv", euler_log(["t", "x", "y", "z", "roll", "pitch", "yaw"], "ZYX", False))
-    which = [("rx", "roll"), ("ry", "pitch"), ("rz", "yaw")]
-    assert_is_the_motion(read_one(source, euler="ZYX", columns=which), MOTIONS["left"])
-    _, message = refusal(source, euler="ZYX")
-    assert "--columns rx=roll,ry=pitch,rz=yaw in ROS" in message
-
-
-def test_quaternions_are_read_beside_euler_angles_unless_these_are_asked_for(write) -> None:
-    rows = "0,0,0,0,0,0,0,1,90,0,0\n.1,0,0,0,0,0,0,1,90,0,0\n"
-    source = write("take.csv", "t,x,y,z,qx,qy,qz,qw,euler_x,euler_y,euler_z\n" + rows)
-    np.testing.assert_array_equal(read_one(source).poses.quaternions[0], [1, 0, 0, 0])
-    turned = read_one(source, euler="XYZ", degrees=True).poses.quaternions[0]
-    np.testing.assert_allclose(turned, [0.5**0.5, 0.5**0.5, 0, 0])
-
-
-def test_degrees_that_could_be_radians_are_told(write) -> None:
-    source = write("take.csv", euler_log(names("t", "{}", "rot_{}", "xyz"), "XYZ", False))
-    (warning,) = read_one(source, euler="XYZ", degrees=True).warnings
-    assert str(warning).endswith("radians need no --degrees")
-
-
-def long_log(device: str, header: Sequence[str] = ("t", "x", "y", "z", "qx", "qy", "qz", "qw"), unit: str = "s") -> str:
-    """Return a log of two devices in alternating rows, named in a column."""
-    lines = [log(header, unit, side=side).splitlines()[1:] for side in MOTIONS]
-    rows = [f"{row},{side}" for both in zip(*lines, strict=True) for row, side in zip(both, MOTIONS, strict=True)]
-    return "\n".join([f"{','.join(header)},{device}", *rows])
-
-
-@pytest.mark.parametrize("name", ["log.csv", "log.tum"])
-def test_devices_that_nothing_tells_apart_are_refused_with_the_columns_there_are(write, refusal, name: str) -> None:
-    rows = [line.rpartition(",")[0] for line in long_log("who").splitlines()]
-    text = "\n".join(rows) if name == "log.csv" else "# " + "\n".join(rows).replace(",", " ")
-    _, message = refusal(write(name, text))
-    assert re.match(
-        r"\d+ of 48 samples jump from one place to another and back, at [\d.]+ m/s: these are several", message
-    )
-    result = "--columns device=NAME (found t, x, y, z, qx, qy, qz, qw), or split the file"
-    assert message.endswith(result if name == "log.csv" else "; write a file for each")
-
-
-def test_a_column_that_is_named_for_devices_and_is_none_is_refused(write, refusal) -> None:
-    rows = "".join(f"{number},0.1,0,0,0,0,0,0,1\n" for number in range(1200))
-    source = write("log.csv", f"id,t,x,y,z,qx,qy,qz,qw\n{rows}")
-    _, message = refusal(source, columns=[("device", "id"), ("t", "t")])
-    assert message.startswith("more than 1000 different values in the column of devices; name another with --columns")
-
-
-@pytest.mark.parametrize(
-    ("header", "options", "told"),
-    [
-        ("when,a,b,c,d,e,f,g", {}, "no column has a known name (found when, a, b, c, d, e, f, g); known are t, time, "),
-        ("frame,x,y,z,qx,qy,qz,qw", {}, "no column of time, only one that counts frames ('frame'); say how many frame"),
-        ("t,left_x,left_y,left_z,button", {}, "positions only, and rotations are needed (found t, left_x, left_y, lef"),
-        ("t,x,x,y,z,qx,qy,qz,qw", {}, "two columns mean x ('x'); say which with --columns x=NAME, or rename or"),
-        ("t,Position,Rotation", {}, "rotations are Euler angles here (Rotation.x, Rotation.y, Rotation.z), and their"),
-        ("t,x,y,z,rx,ry,rz", {}, "rotations are Euler angles here (rx, ry, rz), and their order is not said; say it:"),
-        ("t,x,y,z,qx,qy,qz,qw", {"euler": "XYZ"}, "no column named rx, ry, rz (found t, x, y, z, qx, qy, qz, qw); kn"),
-        ("t,x,y,z,qx,qy,qz,qw", {"columns": [("t", "when")]}, "no column is named 'when'; --columns t=NAME takes one "),
-        ("t [min],x,y,z,qx,qy,qz,qw", {}, "'min' is not a known unit of time; --time-unit s, ms, us, ns"),
-        ("t,x [furlong],y,z,qx,qy,qz,qw", {}, "'furlong' is not a known unit of length; say how many metres it "),
-    ],
-)
-def test_a_refusal_says_what_was_found_what_is_known_and_what_helps(write, refusal, header, options, told):
-    row = "0,(0, 0, 0),(30, 0, 0)" if "Position" in header else ",".join("0" for _ in header.split(","))
-    line, message = refusal(write("take.csv", f"{header}\n{row}\n"), **options)
-    assert message.startswith(told)
-    assert line == 1
-    if "known are" in message:
-        assert (
-            "known are t, time, timestamp_ms; x, px, pos_x, position.x; qw, rot_w, rotation.w; or --columns" in message
-        )
-
-
-def test_angles_that_are_no_radians_are_refused(write, refusal) -> None:
-    rows = "0,0,0,0,359,0,0\n.1,0,0,0,1,0,0\n"
-    source = write("take.csv", f"t,x,y,z,rx,ry,rz\n{rows}")
-    read_one(write("said.csv", f"t,x,y,z,rx_rad,ry_rad,rz_rad\n{rows}"), euler="XYZ")
-    assert refusal(source, euler="XYZ")[1].startswith("angles go up to 359, which are not radians; say so: --degrees;")
-
-
-@pytest.mark.parametrize(
-    ("given", "name"),
-    [
-        ({"columns": [("t", "t")]}, "take.bvh"),
-        ({"euler": "XYZ"}, "take.bvh"),
-        ({"time_unit": "ms"}, "take.csv"),
-    ],
-)
-def test_an_option_that_means_nothing_to_a_format_is_refused(write, refusal, given: dict, name: str) -> None:
-    option, label = next(iter(given)).replace("_", "-"), "BVH" if name.endswith("bvh") else "Motive CSV"
-    text = f"--{option} means nothing to {label}; leave it out, as its files say that themselves"
-    assert refusal(write(name, "Format Version,1.23\n"), **given)[1] == text
-
-
-def test_clocks_that_run_at_different_speeds_are_asked_for(write, refusal) -> None:
-    rows = "".join(f"{row / 90},{row / 45},0,0,0,0,0,0,1\n" for row in range(9))
-    source = write("take.csv", f"time,clock,x,y,z,qx,qy,qz,qw\n{rows}")
-    _, message = refusal(source)
-    assert message.startswith("two columns mean t and disagree ('time' lasts ")
-    assert message.endswith("say which with --columns t=NAME")
-    np.testing.assert_allclose(read_one(source, columns=[("t", "clock")]).times, np.arange(9) / 45.0)
-
-
-@pytest.mark.parametrize(
-    ("rotation", "why"),
-    [
-        ("left_y,left_rx,left_ry,left_rz", "its rotations are Euler angles, for --euler"),
-        ("left_qx,left_qy,left_qz,left_qw", "it has no column y"),
-    ],
-)
-def test_a_body_that_lacks_something_is_named(write, rotation: str, why: str) -> None:
-    header = f"t,x,y,z,qx,qy,qz,qw,left_x,left_z,{rotation}"
-    one = read_one(write("take.csv", header + "\n0,0,0,0,0,0,0,1,0,0,0,0,0,0\n.1,0,0,0,0,0,0,1,0,0,0,0,0,0\n"))
-    assert one.remark == f"'left' is left out, as {why}"
-
-
-def test_bodies_that_share_no_rows_have_their_own_and_nothing_is_lost(write) -> None:
-    header = names("t", "{}", "q{}", prefixes=[f"{side}_" for side in MOTIONS])
-    rows = [log(names("t", "{}", "q{}"), side=side).splitlines()[1:] for side in MOTIONS]
-    lines = [
-        line for left, right in zip(*rows, strict=True) for line in (left + "," * 7, right.replace(",", "," * 8, 1))
-    ]
-    source = write("take.csv", "\n".join([",".join(header), *lines]))
-    for clip in read_clips([f"{source}:*"])[0]:
-        assert len(clip.times) == logs.COUNT
-        assert clip.repairs == ()
+def time_texts(unit: str, start: int) -> list[str]:
+    """Return times as a logger writes them, to the microsecond; whole numbers for microseconds and nanoseconds."""
+    ticks = [start + int(step) for step in MICROSECONDS]
+    digits = {"s": 6, "ms": 3}
+    if unit in digits:
+        cut = digits[unit]
+        return [f"{tick // 10**cut}.{tick % 10**cut:0{cut}}" for tick in ticks]
+    return [str(tick * (1000 if unit == "ns" else 1)) for tick in ticks]
 
 
 @st.composite
 def loggers(draw: st.DrawFn) -> tuple[str, ReadingOptions, str, int]:
     """Return a log of both motions in a random spelling, the options to read it, its unit of time and its start."""
-    unit = draw(st.sampled_from(list(logs.TIMES)))
-    start = draw(st.sampled_from([0, logs.EPOCH]))
-    length = draw(st.sampled_from(list(logs.LENGTHS)))
-    position = draw(st.sampled_from(spellings(logs.POSITIONS))) + draw(st.sampled_from(spellings(logs.LENGTHS[length])))
-    said: dict[str, object] = {"scale": logs.METRES[length]} if position.endswith(("}", "position")) else {}
+
+    def spelling(of: str) -> str:
+        return draw(st.sampled_from(of.split(";")))
+
+    unit = draw(st.sampled_from(list(TIMES)))
+    start = draw(st.sampled_from([0, EPOCH]))
+    length = draw(st.sampled_from(list(LENGTHS)))
+    position = spelling(POSITIONS) + spelling(LENGTHS[length])
+    said: dict[str, object] = {"scale": METRES[length]} if position.endswith(("}", "position")) else {}
     order = draw(st.sampled_from([None, "YXZ", "ZYX", "zxy"]))
-    angle = draw(st.sampled_from(list(logs.ANGLES)))
+    angle = draw(st.sampled_from(list(ANGLES)))
     if order:
-        suffix = draw(st.sampled_from(["", *spellings(logs.ANGLES[angle])]))
-        rotation, axes = draw(st.sampled_from(spellings(logs.EULERS))) + suffix, "xyz"
+        suffix = spelling(f";{ANGLES[angle]}")
+        rotation = spelling(EULERS) + suffix
         said |= {"euler": order, "degrees": angle == "deg"}
     else:
-        rotation, axes = draw(st.sampled_from(spellings(logs.QUATERNIONS))), "xyzw"
+        rotation = spelling(QUATERNIONS)
 
-    def columns_of(side: str, prefix: str) -> dict[str, list[str]]:
-        motion = MOTIONS[side]
-        turns = motion.turns.as_quat()
-        if order:
-            by_turn = motion.turns.as_euler(order, degrees=angle == "deg")
-            turns = by_turn[:, np.argsort(list(order.lower()))]
-        header = names("", position, rotation, axes, prefixes=[prefix])[1:]
-        cells = logs.pose_texts(motion, logs.METRES[length], turns)
-        return {name: [row[place] for row in cells] for place, name in enumerate(header)}
+    def columns_of(motion: Motion, prefix: str) -> dict[str, np.ndarray]:
+        turns = angles(order, angle == "deg", motion) if order else motion.turns.as_quat()
+        header = names(prefix + position, prefix + rotation, "xyz" if order else "xyzw")
+        return dict(zip(header.split(","), np.hstack((motion.positions / METRES[length], turns)).T, strict=True))
 
-    time = draw(st.sampled_from(spellings(logs.TIMES[unit])))
-    times = {time: logs.time_texts(unit, start)}
+    time = spelling(TIMES[unit])
+    columns = {time: np.array(time_texts(unit, start))}
     if time in ("t", "T", "time", "Time", "timestamp", "TimeStamp", "ts", "elapsed time"):
         said["time_unit"] = unit
     if draw(st.booleans(), label="a body has columns of its own"):
-        columns = times | columns_of("left", "left_") | columns_of("right", "right_")
+        for side, motion in MOTIONS.items():
+            columns |= columns_of(motion, f"{side}_")
     else:
-        device = draw(st.sampled_from(spellings(logs.DEVICES)))
-        both = [times | columns_of(side, "") | {device: [side] * logs.COUNT} for side in MOTIONS]
-        columns = {
-            name: [cell for pair in zip(*(item[name] for item in both), strict=True) for cell in pair]
-            for name in both[0]
-        }
-    for extra in draw(st.lists(st.sampled_from(spellings(logs.EXTRAS)), unique=True, max_size=3)):
-        columns[extra] = ["0.5"] * len(columns[time])
-    header, rows = logs.named({name: columns[name] for name in draw(st.permutations(list(columns)))})
+        both = [columns | columns_of(motion, "") for motion in MOTIONS.values()]
+        columns = {name: np.stack([one[name] for one in both], axis=1).ravel() for name in both[0]}
+        columns[spelling(DEVICES)] = np.tile([*MOTIONS], COUNT)
+    for extra in draw(st.lists(st.sampled_from(EXTRAS.split(";")), unique=True, max_size=3)):
+        columns[extra] = np.full(len(columns[time]), "0.5")
+    header = draw(st.permutations(list(columns)))
     separator = draw(st.sampled_from([",", ";", "\t"]))
-    text = logs.written(header, rows, separator)
+    text = csv(",".join(header), *(columns[name] for name in header), separator=separator)
     if separator == ";" and draw(st.booleans()) and "." not in "".join(header):
         text = text.replace(".", ",")
     return text, ReadingOptions(**said), unit, start
@@ -221,5 +123,65 @@ def test_any_spelling_any_unit_any_order_and_any_layout_is_the_motion(tmp_path_f
     path.write_text(text, encoding="utf-8")
     trajectories = read_trajectories(f"{path}:*", options).trajectories
     assert {trajectory.name for trajectory in trajectories} == set(MOTIONS)
+    ticks = {"s": 1e-6, "ms": 1e-3}
+    lost = np.spacing((start + MICROSECONDS[-1]) * ticks[unit]) / (ticks[unit] * 1e6) if unit in ticks else 1e-15
     for trajectory in trajectories:
-        assert_is_the_motion(trajectory, MOTIONS[trajectory.name], start=start, unit=unit)
+        assert_is_the_motion(trajectory, MOTIONS[trajectory.name], SECONDS, clock=2.0 * lost, length=1e-16)
+        assert trajectory.warnings == ()
+
+
+def test_degrees_that_could_be_radians_are_told(write) -> None:
+    source = write("take.csv", csv("t,x,y,z,rot_x,rot_y,rot_z", SECONDS, LEFT.positions, angles("XYZ", False)))
+    (warning,) = read_one(source, euler="XYZ", degrees=True).warnings
+    assert str(warning).endswith("radians need no --degrees")
+
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+samples = st.lists(st.tuples(*[numbers] * 9), min_size=2, max_size=MIN_MIXED_SAMPLES - 1).map(np.array)
+"""Too few samples for the check that looks for several mixed devices."""
+
+
+@settings(max_examples=tried(60))
+@given(samples, st.permutations(range(9)), st.sampled_from([",", ";", "\t"]))
+def test_what_is_written_in_full_precision_comes_back_exactly(tmp_path_factory, table, order, separator):
+    path = Path(tmp_path_factory.getbasetemp()) / "round_trip.csv"
+    header = ["t", "x", "y", "z", "qw", "qx", "qy", "qz", "scale"]
+    path.write_text(csv(",".join(header[column] for column in order), table[:, order], separator=separator))
+    trajectory = read_one(str(path), time_unit="s")
+    np.testing.assert_array_equal(trajectory.times, table[:, 0])
+    np.testing.assert_array_equal(trajectory.poses.positions, table[:, 1:4])
+    np.testing.assert_array_equal(trajectory.poses.quaternions, table[:, 4:8])
+    scales = 1.0 if trajectory.poses.scales is None else trajectory.poses.scales
+    np.testing.assert_array_equal(table[:, 8], scales)
+
+
+def test_what_is_broken_in_the_recording_is_kept_for_the_repair(write) -> None:
+    text = f"{HEADER}\n5,0,0,0,0,0,0,0\n5,nan,,NaN,0,0,0,-2\n4,inf,0,0,0,0,0,1\n"
+    trajectory = read_one(write("take.csv", text))
+    np.testing.assert_array_equal(trajectory.times, [5, 5, 4])
+    np.testing.assert_array_equal(trajectory.poses.quaternions, [[0, 0, 0, 0], [-2, 0, 0, 0], [1, 0, 0, 0]])
+    np.testing.assert_array_equal(trajectory.poses.positions[1], [np.nan] * 3)
+    assert trajectory.poses.positions[2, 0] == np.inf
+
+
+@pytest.mark.parametrize(
+    ("times", "seconds"),
+    [
+        (["2026-11-22T10:00:00.123456789Z", "2026-11-22T10:00:00.373456789Z"], [0, 0.25]),
+        (["2026-11-22 23:59:59.9", "2026-11-23 00:00:00.15"], [0, 0.25]),
+        (['"2026-11-22 10:00:00.000001"', "2026-11-22 10:00:00.250001"], [0, 0.25]),
+        (["0001-01-01T00:00:00", "0001-01-01T00:00:00.25"], [0, 0.25]),
+        (["2026-10-25T02:59:59.9+02:00", "2026-10-25T02:00:00.15+01:00"], [0, 0.25]),
+        (["2026-10-25T02:59:59.9+0200", "2026-10-25T01:00:00.15Z"], [0, 0.25]),
+        (["2026-11-22 06:30:00 -0330", "2026-11-22 10:00:00.25Z"], [0, 0.25]),
+        (["2016-12-31T23:59:60Z", "2017-01-01T00:00:00.25Z"], [0, 0.25]),
+        (["10:00:00.123", "10:00:00.373"], [0, 0.25]),
+        (["23:59:59.9", "00:00:00.15"], [0, 0.25]),
+        (["00:30:00+01:00", "23:30:00.25Z"], [0, 0.25]),
+        (["23:59:59.5", "00:00:00", "23:59:59.75", "00:00:00.25"], [0, 0.5, 0.25, 0.75]),
+        (["10:00:00", "", "NaN", "10:00:00.25"], [0, np.nan, np.nan, 0.25]),
+    ],
+)
+def test_dates_and_clock_times_are_seconds_from_the_first(write, times: list[str], seconds: list[float]) -> None:
+    text = "".join(f"{time},1,2,3,0,0,0,1\n" for time in times)
+    np.testing.assert_array_equal(read_one(write("log.csv", f"{HEADER}\n{text}")).times, seconds)

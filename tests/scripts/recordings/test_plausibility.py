@@ -179,18 +179,7 @@ def test_a_row_without_its_time_changes_no_unit(write, wild: str, row: int) -> N
     assert trajectory.times[8] == 0.3 * 8
 
 
-def test_times_that_make_no_rate_in_any_unit_are_refused(write, refusal) -> None:
-    _, message = refusal(write("take.csv", csv_of([repr(3e9 * row) for row in range(9)])))
-    assert message.startswith("t goes in steps of 3e+09: as seconds that is one sample in 3e+09 s")
-    assert message.endswith("say what it counts: --time-unit s, ms, us, ns")
-
-
-@pytest.mark.parametrize("start", [10**9, 18295873486192640])
-def test_keys_of_rows_are_no_times(write, refusal, start: int) -> None:
-    source = write("take.csv", csv_of([str(start + row) for row in range(9)]))
-    if start > 2**53:
-        assert refusal(source)[1].startswith(
-            f"t counts up by 1 from {start}: these are numbers of rows or keys, not ti"
-        )
+def test_keys_of_rows_are_no_times(write) -> None:
+    source = write("take.csv", csv_of([str(18295873486192640 + row) for row in range(9)]))
     (counted,) = read_trajectories(source, ReadingOptions(frame_rate=90.0)).trajectories
     np.testing.assert_allclose(counted.times - counted.times[0], np.arange(9) / 90.0, atol=1e-8)

@@ -1,0 +1,243 @@
+"""Tests of wrong text files: each is refused with its line, what is wrong, and a way out."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.scripts.recordings.layouts import BOTH, OTHERS, POSE, RAW, SECONDS, csv, rows
+from tests.scripts.recordings.optical_layouts import OPTICAL
+from tests.scripts.recordings.test_bvh import ARM
+from tests.scripts.recordings.written_layouts import HEADER, by_turns
+
+MOTIVE = str(OPTICAL["Motive"].text)
+ROWS = "0.0,1,2,3,0.1,0.2,0.3,0.9\n0.1,4,5,6,0.4,0.5,0.6,0.4\n"
+TUM_COMMENTS = "# ground truth trajectory\n# file: 'dataset.bag'\n# timestamp tx ty tz qx qy qz qw\n"
+TUM_ROWS = "1305031098.6659 1.3 0.6 1.6 0.6132 0.5962 -0.3311 -0.3986\n1305031098.6758 1.4 0.7 1.7 0.1 0.2 0.3 0.4\n"
+MIXED = by_turns(rows(SECONDS, *POSE), rows(SECONDS, *BOTH[2:]))
+"""Two devices in alternating rows that nothing tells apart."""
+
+
+def broken(**changes: object) -> str:
+    """Return an A-Frame recording with changes to the third pose of the first device."""
+    content = json.loads(OTHERS["A-Frame"].text)
+    content["left"]["poses"][2].update(changes)
+    return json.dumps(content)
+
+
+def zeros(header: str) -> str:
+    return f"{header}\n" + ",".join("0" for _ in header.split(",")) + "\n"
+
+
+def at_times(*times: object) -> str:
+    return f"{HEADER}\n" + "".join(f"{time},1,2,3,0,0,0,1\n" for time in times)
+
+
+def next_date(time: str) -> str:
+    return at_times("2026-11-22T10:00:00", time)
+
+
+NO_DATE = "neither a number nor a date that can be read; write 2026-11-22T10:00:00.123, 10:00:00.123 or seconds"
+
+WRONG: dict[str, list[tuple]] = {
+    "take.csv": [
+        ("", None, "the file is empty"),
+        (f"{HEADER.removesuffix(',qw')}\n{ROWS}", 1, "no column named qw"),
+        ("# about\n\nt,x,y,z\n0,1,2,3\n", 3, "positions only, and rotations are needed (found t, x, y, z); record"),
+        (f"{HEADER},x\n{ROWS}", 1, "two columns mean x ('x'); say which with --columns x=NAME, or rename or"),
+        (f"{HEADER}\n{ROWS}0.2,1,2\n", 4, "3 columns where 8 are needed"),
+        (f"{HEADER}\n0,1,2,3,0,0,0,1,5\n{ROWS}", 2, "9 columns where 8 have a name"),
+        (f"{HEADER}\n{ROWS}{'9' * 100_000},{'x' * 100_000},2,3,0,0,0,1\n", 4, f"x is '{'x' * 24}...', not a number"),
+        (f"{HEADER}\n{ROWS}\x1b[2J,1,2,3,0,0,0,1\n", 4, r"t is '\x1b[2J', not a number"),
+        (f"{HEADER}\n{ROWS}".encode() + b"0.2,\xff\xfe,2,3,0,0,0,1\n", 4, "this is not text (byte 0xff)"),
+        (f"Recorder v1.2\n\n{HEADER[:-3]}\n0,1,2,3,0.1,0.2,0.3\n", 3, "no column named qw"),
+        (f"Recorder v1.2\na,b,c\n{ROWS}", 1, "no column has a known name (found Recorder, v1.2)"),
+        (f"Recorder\n{HEADER}\n{ROWS}{HEADER}\n{ROWS}", 2, "lines 2 and 5 both name columns"),
+        ("Recorder\n" * 50 + f"{HEADER}\n{ROWS}", 1, "no column has a known name (found Recorder)"),
+        (f"Recorder\n{HEADER}\n{ROWS}0.2,1,2,three,0,0,0,1\n", 5, "z is 'three', not a number"),
+        (
+            zeros("when,a,b,c,d,e,f,g"),
+            1,
+            "no column has a known name (found when, a, b, c, d, e, f, g); known are t, time, timestamp_ms; "
+            "x, px, pos_x, position.x; qw, rot_w, rotation.w; or --columns",
+        ),
+        (
+            zeros("frame,x,y,z,qx,qy,qz,qw"),
+            1,
+            "no column of time, only one that counts frames ('frame'); say how many frame",
+        ),
+        (zeros("t,left_x,left_y,left_z,button"), 1, "positions only, and rotations are needed (found t, left_x, left"),
+        (zeros("t,x,y,z,rx,ry,rz"), 1, "rotations are Euler angles here (rx, ry, rz), and their order is not said; s"),
+        ("t,Position,Rotation\n0,(0, 0, 0),(30, 0, 0)\n", 1, "rotations are Euler angles here (Rotation.x, Rotation.y"),
+        (zeros(HEADER), 1, "no column named rx, ry, rz (found t, x, y, z, qx, qy, qz, qw); kn", {"euler": "XYZ"}),
+        (
+            zeros("t,x,y,z,roll,pitch,yaw"),
+            1,
+            "roll, pitch and yaw are about other axes…"
+            "--columns rx=roll,ry=pitch,rz=yaw in ROS, rx=pitch,ry=yaw,rz=roll in Unity",
+            {"euler": "ZYX"},
+        ),
+        (zeros(HEADER), 1, "no column is named 'when'; --columns t=NAME takes one", {"columns": [("t", "when")]}),
+        (zeros("t [min],x,y,z,qx,qy,qz,qw"), 1, "'min' is not a known unit of time; --time-unit s, ms, us, ns"),
+        (zeros("t,x [furlong],y,z,qx,qy,qz,qw"), 1, "'furlong' is not a known unit of length; say how many metres it"),
+        (
+            "t,x,y,z,rx,ry,rz\n0,0,0,0,359,0,0\n.1,0,0,0,1,0,0\n",
+            1,
+            "angles go up to 359, which are not radians; say so: --degrees;",
+            {"euler": "XYZ"},
+        ),
+        (
+            csv("time,clock," + HEADER[2:], 2.0 * SECONDS, SECONDS, *POSE),
+            1,
+            "two columns mean t and disagree ('time' lasts…say which with --columns t=NAME",
+        ),
+        (
+            csv(f"id,{HEADER}", np.arange(1200), np.arange(1200) / 10.0, *np.eye(7)[[6] * 1200].T),
+            1,
+            "more than 1000 different values in the column of devices; name another with --columns",
+            {"columns": [("device", "id"), ("t", "t")]},
+        ),
+        (
+            f"{HEADER}\n" + MIXED.replace(" ", ","),
+            1,
+            "40 of 48 samples jump from one place to another and back, at 68.9 m/s: these are several…"
+            "--columns device=NAME (found t, x, y, z, qx, qy, qz, qw), or split the file",
+        ),
+        (
+            at_times(*(repr(3e9 * row) for row in range(9))),
+            1,
+            "t goes in steps of 3e+09: as seconds that is one sample in 3e+09 s…--time-unit s, ms, us, ns",
+        ),
+        (
+            at_times(*range(18295873486192640, 18295873486192649)),
+            1,
+            "t counts up by 1 from 18295873486192640: these are numbers of rows or keys",
+        ),
+    ],
+    "dates.csv": [
+        (next_date("2026-13-22T10:00:00"), 3, "t is '2026-13-22T10:00:00', not a date; delete this line if it is dam"),
+        (next_date("2026-11-22T10:00:61"), 3, "t is '2026-11-22T10:00:61', not a date"),
+        (next_date("2026-11-22T10:00:00.1234567891"), 3, "t is '2026-11-22T10:00:00.1234567891', not a date"),
+        (next_date("2026-11-22T10:00:00\u0661"), 3, "t is '2026-11-22T10:00:00\u0661', not a date"),
+        (next_date("2026-11-22T10:00:00+25:00"), 3, "t is '2026-11-22T10:00:00+25:00', not a date"),
+        (
+            next_date("2026-11-22T10:00:00Z"),
+            3,
+            "t is '2026-11-22T10:00:00Z', not a date without an offset from UTC as before",
+        ),
+        (at_times("11/22/2026 10:00:00"), 2, f"t is '11/22/2026 10:00:00', {NO_DATE}"),
+        (at_times("22.11.2026 10:00"), 2, f"t is '22.11.2026 10:00', {NO_DATE}"),
+        (at_times("2026-11-22"), 2, f"t is '2026-11-22', {NO_DATE}"),
+        (at_times("20261122T100000"), 2, f"t is '20261122T100000', {NO_DATE}"),
+        (
+            at_times("10:00:00Z", "10:00:01Z"),
+            1,
+            "--time-unit ms is for times that are numbers, and these have a clock time with an offset from UTC; le",
+            {"time_unit": "ms"},
+        ),
+    ],
+    "motive.csv": [
+        (MOTIVE.splitlines()[0], 1, "the rows that say what the columns are end too early"),
+        (MOTIVE.replace("Rigid Body", "Marker"), None, "no rigid body, only Marker"),
+        (MOTIVE.replace("Meters", "Cubits"), 1, "Length Units is 'Cubits'"),
+        (MOTIVE.replace("Quaternion", "Matrix"), 1, "Rotation Type is 'Matrix'"),
+        (MOTIVE.replace("Quaternion", "XYZ").replace("X,Y,Z,W", "X,Y,Q,W"), 7, "no column named rx, ry, rz for 'Tool'"),
+        (MOTIVE + "3,0.025" + ",1" * 99 + "\n", 32, "101 columns where 10 have a name"),
+        (MOTIVE.replace(",Tool", ',"Tool', 1).replace("Tool", "x" * 200_000, 1), 4, "this line is not a header"),
+        (MOTIVE.replace("Rigid Body", "").replace("Marker", ""), 7, "no rigid body in this take"),
+        (
+            "Time,Position,Rotation\n0,(0, 0, 0),(0, 0, 0, 1)\n.1,(0, 0),(0, 0, 0, 1)\n",
+            3,
+            "6 columns where 8 are needed",
+        ),
+        (
+            MOTIVE,
+            None,
+            "--time-unit means nothing to Motive CSV; leave it out, as its files say that themselves",
+            {"time_unit": "ms"},
+        ),
+    ],
+    "vicon.csv": [
+        (
+            "Trajectories\n100\n,,a:b\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n",
+            None,
+            "no table of Objects or Segments in it",
+        ),
+        ("Objects\nfast\n", 1, "no column has a known name (found Objects)"),
+        ("Objects\n0\n,,A\nFrame,Sub Frame,RX,RY,RZ,RW,TX,TY,TZ\n", 2, "the rate is '0'; say it: --frame-rate 100"),
+    ],
+    "body.tsv": [
+        ("NO_OF_FRAMES\t9\nNO_OF_BODIES\t1\n", None, "no line names the columns X, Y, Z; export 6D data with Include"),
+        ("NO_OF_FRAMES\t9\nNO_OF_BODIES\t1\nX\tY\tZ\n", 1, "the rate is ''; say it: --frame-rate 100"),
+    ],
+    "poses.json": [
+        ("", 1, "this is not JSON"),
+        ('{"poses":\n[}', 2, "this is not JSON"),
+        ('{"poses": [%s]}' % ("9" * 5000), None, "this JSON cannot be a recording"),
+        ('{"camera": 1, "left": {"events": []}}', None, "this JSON holds no poses"),
+        (broken(position={"x": 1, "y": 2}), None, "pose 2 of 'left' has no number position.z"),
+        (broken(timestamp=10**400), None, "pose 2 of 'left' has no number timestamp"),
+        ('[{"t": 0, "position": [1, 2, 3]}]', None, "positions only, and rotations are needed (found "),
+        (
+            '[{"t": 0, "pos": [1, 2, 3], "quat": [1, 0, 0, 0]}, {"t": 1}]',
+            None,
+            "pose 1 of 'poses' has no number pos[0]",
+        ),
+        (
+            '{"frames": [{"file_path": "a.png", "transform_matrix": 1}]}',
+            None,
+            "this JSON holds no poses; it takes a list",
+        ),
+    ],
+    "poses.txt": [
+        (str(RAW["KITTI"].text), None, "poses without times; say how many frames a second it has: --frame-rate 90"),
+        ("#   POINTS2D[] as (X, Y)\n", None, "no column of time, only one that counts frames"),
+    ],
+    "walk.tum": [
+        ("0 1 2 3 4 5 6\n", 1, "7 numbers in a row, which are not known poses; write a first line of names"),
+        (f"{TUM_COMMENTS}0 1 2 3 0 0 0 1\n0.1 1 2\n", 5, "3 columns where 8 are needed"),
+        (f"{TUM_COMMENTS}0 1 2 3 0 0 0 1 9\n", 4, "9 columns where 8 have a name"),
+        ("0 1 2 3\n0.1 1 2 3\n", 1, "positions only, and rotations are needed; write t x y z qx qy qz qw"),
+        (f"{TUM_ROWS}1,2,3\n", 3, "1 columns where 8 are needed"),
+        (
+            f"# {HEADER.replace(',', ' ')}\n{MIXED}",
+            1,
+            "40 of 48 samples jump from one place to another and back…; write a file for each",
+        ),
+    ],
+    "arm.bvh": [
+        ("", 1, "the file ends where HIERARCHY is expected"),
+        (ARM.split("MOTION")[0], 16, "the file ends where MOTION is expected"),
+        (ARM.replace("}\nMOTION", "MOTION"), 15, "a } is missing before MOTION"),
+        (ARM.replace("}\nMOTION", "}\n}\nMOTION"), 16, "'}' is out of place"),
+        (ARM.replace("JOINT Elbow", "ROOT Elbow"), 6, "'ROOT' is out of place"),
+        (ARM.replace("2.0 0.0 0.0", "2.0 0.0"), 9, "'CHANNELS' where a number of the OFFSET is expected"),
+        (ARM.replace("CHANNELS 3 Z", "CHANNELS 3 Q"), 9, "'Qrotation' is not a channel"),
+        (ARM.replace("CHANNELS 3 Z", "CHANNELS 3 X"), 9, "a channel occurs twice in a joint"),
+        (ARM.replace("Frames: 2", "Frames: two"), 17, "'Frames: two' where Frames: and a positive number are expected"),
+        (ARM.replace("1 5 0  90", "1 5 0  9O").rstrip(), 20, "Shoulder Zrotation is '9O', not a number"),
+        (f"{ARM}2 5 0  90 0 0  -91 0", 21, "8 columns where 9 are needed; delete this line if it is damaged"),
+        ("HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n0\n", 6, "no joint has CHANNELS"),
+        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 50_000, 2, "more than 500 joints hang on one another; export a"),
+        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {}" * 50_000, 2, "more than 3000 joints; export fewer, such as one bod"),
+        (
+            ARM,
+            None,
+            "--columns means nothing to BVH; leave it out, as its files say that themselves",
+            {"columns": [("t", "t")]},
+        ),
+        (ARM, None, "--euler means nothing to BVH; leave it out, as its files say that themselves", {"euler": "XYZ"}),
+    ],
+}
+"""File names and contents; the line that is wrong; the beginning of the error, and after … its end; options."""
+
+
+@pytest.mark.parametrize(("name", "row"), [(name, row) for name, wrong in WRONG.items() for row in wrong])
+def test_a_wrong_file_is_told_with_its_line(write, refusal, name: str, row: tuple) -> None:
+    text, line, told, *options = row
+    told_line, message = refusal(write(name, text), **dict(*options))
+    beginning, _, end = told.partition("…")
+    assert message.startswith(beginning)
+    assert message.endswith(end)
+    assert told_line == line
+    assert len(message) < 200 or len(text) < 10_000
