@@ -23,15 +23,10 @@ def hips_at(times: np.ndarray) -> np.ndarray:
     return np.sin(np.outer(times, (3.0, 2.0, 4.0))) * (0.3, 0.1, 0.4)
 
 
-def write_body(
-    path: Path,
-    times: np.ndarray = TIMES,
-    order: tuple[str, ...] = JOINTS[1:],
-    *,
-    unit: float = 1.0,
-    moves: bool = True,
-) -> Path:
-    """Write a root with two joints in this order, with the motion at these times. `unit` is the units per metre."""
+def bvh_text(
+    times: np.ndarray = TIMES, order: tuple[str, ...] = JOINTS[1:], *, unit: float = 1.0, moves: bool = True
+) -> str:
+    """Return a root with two joints in this order, with the motion at these times. `unit` is the units per metre."""
 
     def offset(name: str) -> str:
         return "OFFSET " + " ".join(f"{unit * value:.9f}" for value in PLACES[name])
@@ -44,5 +39,9 @@ def write_body(
     lines += ["}", "MOTION", f"Frames: {len(times)}", f"Frame Time: {times[1] - times[0]:.12f}"]
     angles = angles_at(times)
     rows = moves * np.concatenate([unit * hips_at(times), *(angles[name] for name in ("Hips", *order))], axis=1)
-    path.write_text("\n".join([*lines, *(" ".join(f"{value:.12f}" for value in row) for row in rows), ""]))
+    return "\n".join([*lines, *(" ".join(f"{value:.12f}" for value in row) for row in rows), ""])
+
+
+def write_body(path: Path, times: np.ndarray = TIMES, *arguments: object, **settings: object) -> Path:
+    path.write_text(bvh_text(times, *arguments, **settings))
     return path

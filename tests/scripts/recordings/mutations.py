@@ -96,18 +96,11 @@ def _replace(pattern: re.Pattern[bytes], instead: tuple[str, ...], content: byte
     return content
 
 
-def delete_line(content: bytes, chance: Random) -> bytes:
-    lines = content.splitlines(keepends=True)
-    if lines:
-        del lines[chance.randrange(len(lines))]
-    return b"".join(lines)
-
-
-def repeat_line(content: bytes, chance: Random) -> bytes:
+def delete_or_repeat_line(content: bytes, chance: Random) -> bytes:
     lines = content.splitlines(keepends=True)
     if lines:
         row = chance.randrange(len(lines))
-        lines[row : row + 1] = [lines[row]] * chance.choice((2, 3, 300))
+        lines[row : row + 1] = [lines[row]] * chance.choice((0, 0, 2, 300))
     return b"".join(lines)
 
 
@@ -142,5 +135,5 @@ def nest(content: bytes, chance: Random) -> bytes:
 MUTATIONS: tuple[Mutation, ...] = (
     *(change_bytes, repeat_piece, truncate, empty),
     *(replace_numbers, replace_numbers, replace_words),
-    *(delete_line, repeat_line, change_line_ends, change_encoding, nest),
+    *(delete_or_repeat_line, delete_or_repeat_line, change_line_ends, change_encoding, nest),
 )

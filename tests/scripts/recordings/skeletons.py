@@ -1,4 +1,4 @@
-"""A small moving body with a skin, made in the open scene and exported as FBX and glTF."""
+"""A small moving body with a skin, made in the open scene and exported as FBX, glTF and .blend."""
 
 import contextlib
 import io
@@ -87,12 +87,14 @@ def surface_in_blender(skin: bpy.types.Object) -> np.ndarray:
 
 
 def export(path: Path, **settings: object) -> Path:
-    """Export the open scene in the format of a path's ending, then clear the scene."""
+    """Export or save the open scene in the format of a path's ending, then clear the scene."""
     with silenced(), contextlib.redirect_stderr(io.StringIO()), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         if path.suffix == ".fbx":
             settings = {"add_leaf_bones": False, "bake_anim_simplify_factor": 0.0} | settings
             bpy.ops.export_scene.fbx(filepath=str(path), **settings)
+        elif path.suffix == ".blend":
+            bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=False)
         else:
             kind = "GLB" if path.suffix == ".glb" else "GLTF_SEPARATE"
             bpy.ops.export_scene.gltf(filepath=str(path), export_format=kind, **settings)

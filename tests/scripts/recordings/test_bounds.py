@@ -9,11 +9,12 @@ import tracemalloc
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rigid_motion_batch.recordings import TrajectoryError, bvh, read_trajectories, recordings, tables
+from tests.scripts.bvh_bodies import TIMES, bvh_text
 from tests.scripts.recordings.layouts import OTHERS, RAW
-from tests.scripts.recordings.seeds import bvh as bvh_of
 from tests.scripts.recordings.written_layouts import PLAIN
 
 SIZE = 100_000
@@ -75,7 +76,7 @@ BOMBS |= {
     "sound.csv": f"{HEADER}\n{ROWS * 100}",
     "sound.tum": str(RAW["TUM"].text) * 100,
     "sound.json": json.dumps({"poses": 100 * json.loads(OTHERS["A-Frame of 2017"].text)}),
-    "sound.bvh": bvh_of(300),
+    "sound.bvh": bvh_text(np.arange(600) / 30.0),
 }
 """Contents of files by name; some are sound recordings."""
 
@@ -106,17 +107,9 @@ def test_what_a_file_takes_is_bounded_by_what_it_holds(tmp_path: Path, name: str
         (tables, "MOST_ROWS", 5, "take.tum", str(RAW["TUM"].text), 24, "more than 5 rows; split the recording"),
         (tables, "LONGEST_LINE", 50, "take.csv", CSV + "1" * 60, 2, "this line is longer than 50 characters; name a"),
         (tables, "MOST_COLUMNS", 5, "take.csv", CSV, 1, "more than 5 columns; export fewer bodies"),
-        (bvh, "MOST_JOINTS", 1, "take.bvh", bvh_of(), 8, "more than 1 joints; export fewer, such as one"),
-        (bvh, "LONGEST_NAME", 0, "take.bvh", bvh_of(), 2, "a { is missing after a name; export the BVH"),
-        (
-            recordings,
-            "MOST_POSES",
-            15,
-            "take.bvh",
-            bvh_of(),
-            None,
-            "2 joints in 8 frames are more than 15",
-        ),
+        (bvh, "MOST_JOINTS", 1, "take.bvh", bvh_text(TIMES[:8]), 8, "more than 1 joints; export fewer, such as one"),
+        (bvh, "LONGEST_NAME", 0, "take.bvh", bvh_text(TIMES[:8]), 2, "a { is missing after a name; export the BVH"),
+        (recordings, "MOST_POSES", 15, "take.bvh", bvh_text(TIMES[:8]), None, "3 joints in 8 frames are more than 15"),
     ],
 )
 def test_what_is_beyond_a_limit_is_refused(write, refusal, monkeypatch, module, limit, lowered, name, text, line, told):

@@ -7,9 +7,24 @@ import pytest
 
 from rigid_motion.motion.quaternions import angle_between
 from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
-from tests.scripts.recordings.seeds import ARM as JOINTS
 
-ARM = f"""{JOINTS}Frames: 2
+ARM = """HIERARCHY
+ROOT Shoulder
+{
+    OFFSET 0.0 0.0 0.0
+    CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+    JOINT Elbow
+    {
+        OFFSET 2.0 0.0 0.0
+        CHANNELS 3 Zrotation Xrotation Yrotation
+        End Site
+        {
+            OFFSET 1.0 0.0 0.0
+        }
+    }
+}
+MOTION
+Frames: 2
 Frame Time: 0.04
 0 0 0  0 0 0  0 0 0
 1 5 0  90 0 0  -90 0 0

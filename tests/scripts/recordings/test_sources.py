@@ -10,7 +10,7 @@ import pytest
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.reading import ENDINGS, FORMATS, OTHER_FORMATS, files_of, split_source
 from rigid_motion_batch.recordings.recordings import unique
-from tests.scripts.recordings.seeds import bvh
+from tests.scripts.bvh_bodies import bvh_text
 
 CSV = "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,0,0,0,0,0,1\n"
 
@@ -96,7 +96,7 @@ def test_an_unknown_extension_is_answered_with_the_known_ones(write, refusal) ->
 
 
 def test_a_name_from_a_file_cannot_reach_the_terminal(write) -> None:
-    recording = read_trajectories(write("walk.bvh", bvh().replace("Elbow", "\x1b[2JElbow")))
+    recording = read_trajectories(write("walk.bvh", bvh_text().replace("Head", "\x1b[2JHead")))
     assert recording.note.isprintable()
 
 
@@ -104,7 +104,7 @@ def test_a_file_that_may_not_be_read_is_told(write, refusal, monkeypatch: pytest
     def refuse(*_: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    path = write("walk.bvh", bvh())
+    path = write("walk.bvh", bvh_text())
     monkeypatch.setattr(Path, "open", refuse)
     assert refusal(path)[1] == "this file cannot be read (Permission denied); check its permissions"
 
