@@ -1,6 +1,6 @@
 """Scenes with keyed objects and rigs, for tests that save and read .blend files."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -57,6 +57,25 @@ def linear(obj: bpy.types.Object) -> None:
     for fcurve in fcurves(obj):
         for point in fcurve.keyframe_points:
             point.interpolation = "LINEAR"
+
+
+def in_blender(frames: Iterable[float], show: Callable[[bpy.types.Depsgraph], list]) -> np.ndarray:
+    """Return what a function finds in the open scene on some frames, shape (things, frames, ...)."""
+    seen = []
+    for frame in frames:
+        bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
+        seen.append(show(bpy.context.evaluated_depsgraph_get()))
+    return np.array(seen).swapaxes(0, 1)
+
+
+def bones_in_blender(obj: bpy.types.Object, bones: Sequence[str], frames: Iterable[float]) -> np.ndarray:
+    """Return the matrices of bones in the world on some frames, shape (bones, frames, 4, 4)."""
+
+    def show(depsgraph: bpy.types.Depsgraph) -> list:
+        shown = obj.evaluated_get(depsgraph)
+        return [shown.matrix_world @ shown.pose.bones[name].matrix for name in bones]
+
+    return in_blender(frames, show)
 
 
 def on_frames(trajectory: Trajectory) -> Trajectory:

@@ -1,6 +1,7 @@
 """Fixtures that write small recordings and scenes, and check that an error has the promised one-line form."""
 
 import re
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -26,8 +27,10 @@ def refusal() -> Callable[..., tuple[int | None, str]]:
     """A function that reads an unreadable source with given options, and returns the line and the rest of the error."""
 
     def _refusal(source: str, **options: object) -> tuple[int | None, str]:
+        started = time.process_time()
         with pytest.raises(TrajectoryError) as caught:
             read_trajectories(source, ReadingOptions(**options))
+        assert time.process_time() - started < 20.0
         message = str(caught.value)
         parts = re.fullmatch(r"(?P<path>.+?\.\w+)(:(?P<line>\d+))?: (?P<problem>.+?); (?P<way_out>.+)", message)
         assert parts, f"not of the form FILE:LINE: problem; way out: {message!r}"

@@ -3,7 +3,6 @@
 import contextlib
 import io
 import warnings
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 
 from rigid_motion_batch.silencing import silenced
 from tests.blank import blank
-from tests.scripts.recordings.blends import key, rig
+from tests.scripts.recordings.blends import bones_in_blender, in_blender, key, rig
 
 bpy = pytest.importorskip("bpy")
 
@@ -30,7 +29,6 @@ FRAMES = range(1, 21)
 
 TRIANGLES = [(0, 1, 2), (1, 2, 3)]
 
-
 UNEVEN = (1.2, 1.0, 0.8)
 """An uneven object scale, which shears rotated children."""
 
@@ -42,13 +40,17 @@ def body(name: str = "Body", fps: int = 24, size: tuple[float, float, float] = U
     obj = rig(name, BONES)
     obj.data.bones["Lever"].use_deform = False
     obj.rotation_mode, obj.scale = "QUATERNION", size
+    animate(obj)
+    return obj
+
+
+def animate(obj: bpy.types.Object, swing: float = 0.3) -> None:
     for frame in FRAMES:
         half = 0.02 * frame
         key(obj, frame, location=(0.01 * frame, 0.1, 0.2), rotation_quaternion=(np.cos(half), 0, 0, np.sin(half)))
         for number, bone in enumerate(obj.pose.bones):
-            key(bone, frame, rotation_euler=(0.3 * np.sin(0.1 * frame + number), 0.005 * number * frame, 0.2))
-    scene.frame_set(FRAMES[0])
-    return obj
+            key(bone, frame, rotation_euler=(swing * np.sin(0.1 * frame + number), 0.005 * number * frame, 0.2))
+    bpy.context.scene.frame_set(FRAMES[0])
 
 
 def skinned(obj: bpy.types.Object) -> bpy.types.Object:
@@ -66,24 +68,19 @@ def skinned(obj: bpy.types.Object) -> bpy.types.Object:
     return skin
 
 
-def places_in_blender(obj: bpy.types.Object, bones: Sequence[str], frames: Iterable[int] = FRAMES) -> np.ndarray:
-    """Return the head positions of bones in the open scene on some frames, shape (bones, frames, 3)."""
-    seen = []
-    for frame in frames:
-        bpy.context.scene.frame_set(frame)
-        shown = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        seen.append([(shown.matrix_world @ shown.pose.bones[name].matrix).translation for name in bones])
-    return np.array(seen).swapaxes(0, 1)
+def places_in_blender(obj: bpy.types.Object) -> np.ndarray:
+    """Return the head positions of the deforming bones on `FRAMES`, shape (bones, frames, 3)."""
+    return bones_in_blender(obj, CARRYING, FRAMES)[..., :3, 3]
 
 
 def surface_in_blender(skin: bpy.types.Object) -> np.ndarray:
     """Return the vertex positions of a mesh in the open scene on `FRAMES`, shape (vertices, frames, 3)."""
-    seen = []
-    for frame in FRAMES:
-        bpy.context.scene.frame_set(frame)
-        shown = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        seen.append([shown.matrix_world @ vertex.co for vertex in shown.data.vertices])
-    return np.array(seen).swapaxes(0, 1)
+
+    def show(depsgraph: bpy.types.Depsgraph) -> list:
+        shown = skin.evaluated_get(depsgraph)
+        return [shown.matrix_world @ vertex.co for vertex in shown.data.vertices]
+
+    return in_blender(FRAMES, show)
 
 
 def export(path: Path, **settings: object) -> Path:

@@ -85,12 +85,6 @@ def test_a_file_without_animation_is_answered_with_its_objects(saved, refusal) -
     assert message.endswith(":NAME: Lamp")
 
 
-@pytest.mark.parametrize("content", [b"", b"junk", b"BLENDER-v405" + bytes(500), b"\x28\xb5\x2f\xfd" + bytes(50)])
-def test_a_file_that_blender_cannot_open_is_told_in_one_line(write, refusal, content: bytes) -> None:
-    _, message = refusal(write("scene.blend", content))
-    assert message.startswith("Blender cannot open this file")
-
-
 @pytest.mark.parametrize("frame", [1.9e35, -2e6, float("inf")])
 def test_a_key_where_no_frame_is_costs_no_hours(saved, refusal, frame: float) -> None:
     drill = empty("Drill")

@@ -1,10 +1,12 @@
 """Tests of wrong text files: each is refused with its line, what is wrong, and a way out."""
 
 import json
+import struct
 
 import numpy as np
 import pytest
 
+from rigid_motion_batch.recordings.fbx import MAGIC
 from tests.scripts.recordings.layouts import BOTH, OTHERS, POSE, RAW, SECONDS, csv, rows
 from tests.scripts.recordings.optical_layouts import OPTICAL
 from tests.scripts.recordings.test_bvh import ARM
@@ -37,6 +39,12 @@ def next_date(time: str) -> str:
     return at_times("2026-11-22T10:00:00", time)
 
 
+def of_gltf(**content: object) -> str:
+    return json.dumps({"asset": {"version": "2.0"}} | content)
+
+
+NESTED = [*({"children": [node + 1]} for node in range(5000)), {}]
+VRM = {"VRMC_vrm_animation": {"humanoid": {"humanBones": {"hips": {"node": 0}}}}}
 NO_DATE = "neither a number nor a date that can be read; write 2026-11-22T10:00:00.123, 10:00:00.123 or seconds"
 
 WRONG: dict[str, list[tuple]] = {
@@ -204,6 +212,17 @@ WRONG: dict[str, list[tuple]] = {
             1,
             "40 of 48 samples jump from one place to another and back…; write a file for each",
         ),
+    ],
+    "old.fbx": [
+        (MAGIC + struct.pack("<I", 6100) + bytes(200), None, "this is FBX 6.1, and Blender imports 7.1 and later; exp"),
+        ("; FBX 7.4.0 project file\n", None, "this is an FBX of text, or none; export it as binary FBX"),
+    ],
+    "walk.gltf": [
+        (of_gltf(nodes=NESTED), None, "more than 1000 nodes hang on one another; export"),
+        (of_gltf(nodes=[{}] * 200_000), None, "200000 nodes are more than the 100000"),
+        (of_gltf(skins=[{"joints": [0] * 4000}]), None, "4000 joints of a skin are more than the 3000 that"),
+        (of_gltf(animations=[{"channels": [{}] * 200_000}]), None, "'animation 0': channel 0 has no target; export"),
+        (of_gltf(nodes=[{"name": "Hips"}, {"name": 3}], extensions=VRM), None, "nothing moves in this file"),
     ],
     "arm.bvh": [
         ("", 1, "the file ends where HIERARCHY is expected"),

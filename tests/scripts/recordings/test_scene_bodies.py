@@ -1,7 +1,6 @@
 """Tests of bodies in scene files (props, cameras, node hierarchies without a skin) against Blender's own import."""
 
 import itertools
-import json
 import shutil
 import sys
 from collections.abc import Sequence
@@ -309,15 +308,6 @@ def test_two_keys_at_one_time_are_a_cut(tmp_path: Path) -> None:
         assert cup.poses.positions[sample, 0] == pytest.approx(place, abs=1e-3)
     assert len(cup.times) == 62, "60 a second, and one before the cut"
     assert "it jumps" in cup.warnings[0].text
-
-
-def test_a_body_that_stands_still_is_told(tmp_path: Path, refusal) -> None:
-    human = {"VRMC_vrm_animation": {"humanoid": {"humanBones": {"hips": {"node": 0}}}}}
-    path = tmp_path / "still.gltf"
-    path.write_text(
-        json.dumps({"asset": {"version": "2.0"}, "nodes": [{"name": "Hips"}, {"name": 3}], "extensions": human})
-    )
-    assert refusal(str(path))[1].startswith("nothing moves in this file")
 
 
 def test_what_moves_in_an_unknown_way_is_told(tmp_path: Path) -> None:
