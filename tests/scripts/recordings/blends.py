@@ -14,9 +14,9 @@ anim_utils = pytest.importorskip("bpy_extras.anim_utils")
 FPS = 50
 
 
-def empty(name: str, **settings: object) -> bpy.types.Object:
-    """Add an empty to the open scene."""
-    obj = bpy.data.objects.new(name, None)
+def added(name: str, data: bpy.types.ID | None = None, **settings: object) -> bpy.types.Object:
+    """Add an object to the open scene, an empty if it has no data."""
+    obj = bpy.data.objects.new(name, data)
     bpy.context.scene.collection.objects.link(obj)
     for setting, value in settings.items():
         setattr(obj, setting, value)
@@ -25,8 +25,7 @@ def empty(name: str, **settings: object) -> bpy.types.Object:
 
 def rig(name: str, bones: Mapping[str, tuple[Sequence[float], Sequence[float], str | None]]) -> bpy.types.Object:
     """Add an armature object to the open scene; bones are given by head, tail, and the name of the parent or None."""
-    obj = bpy.data.objects.new(name, bpy.data.armatures.new(name))
-    bpy.context.scene.collection.objects.link(obj)
+    obj = added(name, bpy.data.armatures.new(name))
     bpy.context.view_layer.objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")
     for bone_name, (head, tail, parent) in bones.items():
@@ -64,7 +63,7 @@ def in_blender(frames: Iterable[float], show: Callable[[bpy.types.Depsgraph], li
     seen = []
     for frame in frames:
         bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
-        seen.append(show(bpy.context.evaluated_depsgraph_get()))
+        seen.append(np.array(show(bpy.context.evaluated_depsgraph_get())))
     return np.array(seen).swapaxes(0, 1)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from rigid_motion_batch.silencing import silenced
 from tests.blank import blank
-from tests.scripts.recordings.blends import bones_in_blender, in_blender, key, rig
+from tests.scripts.recordings.blends import added, bones_in_blender, in_blender, key, rig
 
 bpy = pytest.importorskip("bpy")
 
@@ -57,9 +57,7 @@ def skinned(obj: bpy.types.Object) -> bpy.types.Object:
     """Add a mesh of four vertices deformed by an armature, each with a weight of three quarters on one bone."""
     mesh = bpy.data.meshes.new("Skin")
     mesh.from_pydata([(0, 0, 0), (0.1, 0, 1), (0, 0.1, 1.5), (0.6, 0.2, 1.8)], [], TRIANGLES)
-    skin = bpy.data.objects.new("Skin", mesh)
-    bpy.context.scene.collection.objects.link(skin)
-    skin.parent = obj
+    skin = added("Skin", mesh, parent=obj)
     skin.modifiers.new("Armature", "ARMATURE").object = obj
     for number, name in enumerate(CARRYING):
         group = skin.vertex_groups.new(name=name)

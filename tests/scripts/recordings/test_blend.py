@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from rigid_motion_batch.recordings import read_trajectories
-from tests.scripts.recordings.blends import empty, fcurves, key
+from tests.scripts.recordings.blends import added, fcurves, key
 
 bpy = pytest.importorskip("bpy")
 
 
 def test_the_animated_objects_are_told_and_still_ones_are_not(saved) -> None:
     for name in ("Lamp", "Ball", "Camera"):
-        obj = empty(name)
+        obj = added(name)
         if name != "Lamp":
             key(obj, 1, location=(0, 0, 0))
             key(obj, 9, location=(1, 0, 0))
-    painted = empty("Painted")
+    painted = added("Painted")
     key(painted, 1, color=(1, 0, 0, 1))
     path = saved()
     recording = read_trajectories(path)
@@ -30,7 +30,7 @@ def test_the_animated_objects_are_told_and_still_ones_are_not(saved) -> None:
 
 def test_scale_and_unit_are_told(saved, scene: bpy.types.Scene) -> None:
     scene.unit_settings.scale_length = 0.01
-    obj = empty("Balloon")
+    obj = added("Balloon")
     key(obj, 1, scale=(1, 1, 1))
     key(obj, 5, scale=(3, 3, 3))
     (trajectory,) = read_trajectories(saved()).trajectories
@@ -39,18 +39,14 @@ def test_scale_and_unit_are_told(saved, scene: bpy.types.Scene) -> None:
 
 
 def test_what_is_open_stays_as_it_is(saved) -> None:
-    key(empty("Ball"), 1, location=(0, 0, 0))
+    key(added("Ball"), 1, location=(0, 0, 0))
     path = saved()
     bpy.context.scene.frame_set(7)
-    empty("Ball")
+    added("Ball")
 
-    def state() -> list:
-        data = ("scenes", "objects", "actions", "libraries", "collections", "worlds")
-        return [[item.name_full for item in getattr(bpy.data, kind)] for kind in data] + [
-            bpy.data.filepath,
-            bpy.context.scene.name,
-            bpy.context.scene.frame_current,
-        ]
+    def state() -> tuple:
+        names = sorted(repr(block) for block in bpy.data.user_map())
+        return names, bpy.data.filepath, bpy.context.scene.name, bpy.context.scene.frame_current
 
     before = state()
     read_trajectories(path + ":*")
@@ -60,7 +56,7 @@ def test_what_is_open_stays_as_it_is(saved) -> None:
 @pytest.mark.parametrize("allowed", [False, True])
 def test_no_script_of_the_file_is_run(saved, tmp_path: Path, allowed: bool) -> None:
     trace = tmp_path / "trace"
-    driver = empty("Driven").driver_add("location", 0).driver
+    driver = added("Driven").driver_add("location", 0).driver
     driver.expression = f"len(__import__('pathlib').Path({str(trace)!r}).write_text('run') * [0]) + 1"
     text = bpy.data.texts.new("startup.py")
     text.write(f"open({str(trace)!r}, 'w')")
@@ -79,7 +75,7 @@ def test_no_script_of_the_file_is_run(saved, tmp_path: Path, allowed: bool) -> N
 
 
 def test_a_file_without_animation_is_answered_with_its_objects(saved, refusal) -> None:
-    empty("Lamp")
+    added("Lamp")
     _, message = refusal(saved())
     assert message.startswith("no moving body in this file; name one with ")
     assert message.endswith(":NAME: Lamp")
@@ -87,7 +83,7 @@ def test_a_file_without_animation_is_answered_with_its_objects(saved, refusal) -
 
 @pytest.mark.parametrize("frame", [1.9e35, -2e6, float("inf")])
 def test_a_key_where_no_frame_is_costs_no_hours(saved, refusal, frame: float) -> None:
-    drill = empty("Drill")
+    drill = added("Drill")
     key(drill, 1, location=(0, 0, 0))
     key(drill, 9, location=(1, 0, 0))
     fcurves(drill)[0].keyframe_points[0 if frame < 0.0 else 1].co.x = frame
@@ -97,7 +93,7 @@ def test_a_key_where_no_frame_is_costs_no_hours(saved, refusal, frame: float) ->
 
 
 def test_a_name_that_is_no_text_is_told(saved, refusal) -> None:
-    drill = empty("Drill")
+    drill = added("Drill")
     key(drill, 1, location=(0, 0, 0))
     key(drill, 9, location=(1, 0, 0))
     bpy.context.preferences.filepaths.use_file_compression = False

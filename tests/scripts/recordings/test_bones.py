@@ -5,8 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion_batch.recordings import Trajectory, read_trajectories
-from tests.scripts.recordings.blends import FPS, key, linear, on_frames, rig
-from tests.scripts.recordings.skeletons import places_in_blender
+from tests.scripts.recordings.blends import FPS, bones_in_blender, key, linear, on_frames, rig
 from tests.thoroughness import sample
 
 bpy = pytest.importorskip("bpy")
@@ -20,28 +19,20 @@ HAND = {"Hand": ((0, 2, 0), (1, 2, 0), "Lower")}
 BONES = ("Upper", "Lower", "Hand")
 
 
-def matrix(position: object = (0, 0, 0), axis: str = "z", degrees: float = 0.0, scale: float = 1.0) -> np.ndarray:
-    made = np.eye(4)
-    made[:3, :3] = scale * Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
-    made[:3, 3] = position
-    return made
-
-
 def read(source: str) -> Trajectory:
     (trajectory,) = read_trajectories(source).trajectories
     return on_frames(trajectory)
 
 
-def assert_are(trajectory: Trajectory, expected: list[np.ndarray]) -> None:
-    """Check positions, rotations and scales against matrices, shape (4, 4) each; scales are the lengths of the axes."""
-    expected = np.stack(expected)
+def assert_are(trajectory: Trajectory, expected: np.ndarray) -> None:
+    """Check positions, rotations and scales against matrices, shape (n, 4, 4); scales are the lengths of the axes."""
     lengths = np.linalg.norm(expected[:, :3, 0], axis=1)
     rotations = Rotation.from_matrix(expected[:, :3, :3] / lengths[:, None, None])
     result = Rotation.from_quat(trajectory.poses.quaternions, scalar_first=True)
     np.testing.assert_allclose(trajectory.poses.positions, expected[:, :3, 3], atol=3e-6)
     np.testing.assert_allclose((result * rotations.inv()).magnitude(), 0.0, atol=3e-6)
-    scales = trajectory.poses.scales
-    np.testing.assert_allclose(lengths if scales is None else scales, lengths if scales is not None else 1.0, atol=3e-6)
+    scales = 1.0 if trajectory.poses.scales is None else trajectory.poses.scales
+    np.testing.assert_allclose(lengths, scales, atol=3e-6)
 
 
 def waving(name: str = "Rig") -> bpy.types.Object:
@@ -65,13 +56,7 @@ def test_a_bone_moves_in_the_world_as_its_chain_and_its_object_do(saved) -> None
     for frame in (3, 13):
         key(arm, frame, location=(frame, -1, 0), scale=(2, 2, 2))
     linear(arm)
-    expected = []
-    for frame in range(1, 22):
-        held, moved = np.clip(frame, 5, 11), np.clip(frame, 3, 13)
-        upper_pose = matrix((moved, -1, 0), scale=2.0) @ matrix(axis="z", degrees=3.0 * frame)
-        lower_pose = upper_pose @ matrix((0, 1, 0)) @ matrix((0.1 * held, 0, 0), "x", 10.0 * held)
-        hand_rest = matrix((0, 1, 0), "z", -90.0)
-        expected.append(lower_pose @ hand_rest @ matrix((0, 0, 0.2 * held), scale=0.1 * held))
+    (expected,) = bones_in_blender(arm, ("Hand",), range(1, 22))
     trajectory = read(saved() + ":Rig/Hand")
     assert trajectory.name == "Rig/Hand"
     np.testing.assert_allclose(trajectory.times * FPS, np.arange(1, 22), rtol=1e-15)
@@ -95,8 +80,8 @@ def test_rigs_of_libraries_can_be_read(saved, how: str) -> None:
         for frame in (1, 9):
             key(arm.pose.bones["Hand"], frame, location=(0, 2 * frame, 0))
     bpy.context.view_layer.update()
-    expected = places_in_blender(arm, ("Hand",), range(1, 10))[0]
-    np.testing.assert_allclose(read(saved("shot.blend") + ":Rig/Hand").poses.positions, expected, atol=2e-6)
+    (expected,) = bones_in_blender(arm, ("Hand",), range(1, 10))
+    assert_are(read(saved("shot.blend") + ":Rig/Hand"), expected)
 
 
 ODD = [
@@ -115,7 +100,7 @@ def test_bones_and_rigs_may_be_called_anything(saved, name: str) -> None:
     path = saved()
     trajectory = read(f"{path}:{name}/{name}")
     assert trajectory.name == f"{name}/{name}"
-    assert_are(trajectory, [matrix((frame, 1, 0)) for frame in range(3, 9)])
+    np.testing.assert_allclose(trajectory.poses.positions, [(frame, 1, 0) for frame in range(3, 9)], atol=3e-6)
     assert read(path).rest_body.joints == ("Hand", name)
 
 
@@ -136,7 +121,7 @@ def places(trajectory: Trajectory) -> np.ndarray:
 def test_an_armature_whose_bones_move_is_a_whole_body(saved) -> None:
     arm = waving()
     arm.location, arm.scale = (3, 0, 0), (2, 2, 2)
-    expected = places_in_blender(arm, BONES, range(1, 10))
+    expected = bones_in_blender(arm, BONES, range(1, 10))
     path = saved()
     for source in (path, f"{path}:Rig"):
         recording = read_trajectories(source)
@@ -146,7 +131,7 @@ def test_an_armature_whose_bones_move_is_a_whole_body(saved) -> None:
         assert body.rest_body.parents.tolist() == [-1, 0, 1]
         assert body.poses.scales is None
         np.testing.assert_allclose(body.times * FPS, range(1, 10))
-        np.testing.assert_allclose(places(body), expected, atol=2e-6)
+        np.testing.assert_allclose(places(body), expected[..., :3, 3], atol=2e-6)
         np.testing.assert_allclose(body.rest_body.rest.positions, [[3, 0, 0], [3, 2, 0], [3, 4, 0]], atol=1e-6)
         np.testing.assert_allclose(body.rest_body.tails, [[0, 2, 0]] * 3, atol=1e-6)
         np.testing.assert_allclose(body.rest_body.ends, [0, 0, 2], atol=1e-6)
@@ -159,13 +144,13 @@ def test_of_a_rig_the_bones_count_that_deform(saved) -> None:
     for name in ("Lower", "Lever"):
         arm.data.bones[name].use_deform = False
     linear(arm)
-    expected = places_in_blender(arm, ("Upper", "Hand"), range(1, 10))
+    expected = bones_in_blender(arm, ("Upper", "Hand"), range(1, 10))
     recording = read_trajectories(saved())
     (body,) = map(on_frames, recording.trajectories)
     assert recording.note.startswith("took the 2 bones that deform of 4")
     assert body.rest_body.joints == ("Upper", "Hand")
     assert body.rest_body.parents.tolist() == [-1, 0], "the nearest that counts"
-    np.testing.assert_allclose(places(body), expected, atol=2e-6)
+    np.testing.assert_allclose(places(body), expected[..., :3, 3], atol=2e-6)
 
 
 def test_bones_that_are_mirrored_flattened_or_scaled_to_nothing_still_have_poses(saved) -> None:
@@ -174,9 +159,9 @@ def test_bones_that_are_mirrored_flattened_or_scaled_to_nothing_still_have_poses
         key(arm.pose.bones["Upper"], frame, rotation_euler=(0, 0, frame / 9), scale=(1, 2, 0.5))
         key(arm.pose.bones["Hand"], frame, scale=(0.0 if frame > 5 else 1.0,) * 3)
     arm.scale = (-1, 1, 1)
-    expected = places_in_blender(arm, BONES, range(1, 10))
+    expected = bones_in_blender(arm, BONES, range(1, 10))
     body = read(saved())
-    np.testing.assert_allclose(places(body), expected, atol=2e-6)
+    np.testing.assert_allclose(places(body), expected[..., :3, 3], atol=2e-6)
     np.testing.assert_allclose(np.linalg.norm(body.poses.quaternions, axis=-1), 1.0, atol=1e-12)
 
 

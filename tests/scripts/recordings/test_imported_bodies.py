@@ -19,7 +19,7 @@ from rigid_motion_batch.recordings.fbx import FIRST_RECORD_BYTE
 from rigid_motion_batch.scenes.armature import RestFigure
 from rigid_motion_batch.scenes.physique import body_size
 from rigid_motion_batch.silencing import silenced
-from tests.scripts.recordings.blends import empty, key, on_frames, rig
+from tests.scripts.recordings.blends import added, key, on_frames, rig
 from tests.scripts.recordings.glbs import curved, soldier
 from tests.scripts.recordings.skeletons import (
     BONES,
@@ -167,7 +167,7 @@ def test_images_of_an_fbx_are_not_looked_for(scene, tmp_path: Path, monkeypatch:
 
 
 def test_a_file_in_which_nothing_moves_is_told(scene, tmp_path: Path, refusal) -> None:
-    empty("Lamp")
+    added("Lamp")
     for ending in ENDINGS:
         path = export(tmp_path / f"lamp{ending}")
         assert refusal(str(path))[1].startswith("nothing moves in this file; export what moves, a skeleton or objects,")

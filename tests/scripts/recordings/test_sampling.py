@@ -7,7 +7,7 @@ import pytest
 
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion_batch.recordings import Trajectory, read_trajectories
-from tests.scripts.recordings.blends import FPS, empty, fcurves, key, linear
+from tests.scripts.recordings.blends import FPS, added, fcurves, in_blender, key, linear
 from tests.scripts.recordings.glbs import Body, Track, chain, curved, mixed_rates, turning
 
 bpy = pytest.importorskip("bpy")
@@ -71,55 +71,40 @@ def test_a_step_is_two_samples_and_is_told(tmp_path: Path) -> None:
     assert "first at 0.3992 s" in warning.text
 
 
-def truth(name: str, frames: np.ndarray, bone: str | None = None) -> np.ndarray:
-    """Return the positions of an object or a bone of the open scene on some frames, shape (n, 3)."""
-    obj, seen = bpy.data.objects[name], []
-    for frame in frames.tolist():
-        bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
-        shown = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        place = shown.matrix_world @ shown.pose.bones[bone].matrix if bone else shown.matrix_world
-        seen.append(np.array(place.translation))
-    return np.array(seen)
-
-
-def in_a_strip(obj: bpy.types.Object, start: float, **settings: object) -> None:
-    """Move the Action of an object into an NLA strip that begins at `start`."""
+def in_a_strip(obj: bpy.types.Object, **settings: object) -> bpy.types.NlaStrip:
+    """Move the Action of an object into an NLA strip."""
     data = obj.animation_data
-    strip = data.nla_tracks.new().strips.new("Strip", int(start), data.action)
+    strip = data.nla_tracks.new().strips.new("Strip", 1, data.action)
     if strip.action_slot is None:
         strip.action_slot = data.action.slots[0]
     data.action = None
     for name, value in settings.items():
         setattr(strip, name, value)
+    return strip
 
 
 STRIPS = [{"scale": 1.5}, {"scale": 0.37, "repeat": 3.0}, {"scale": 1.5, "use_reverse": True}, {"frame_start": 5.3}]
 
 
-def keyed_object() -> None:
-    """Add an object keyed on every third frame with Blender's default easing, as an animator blocks it out."""
-    tool = empty("Tool")
-    for number, frame in enumerate(range(1, 32, 3)):
-        key(tool, frame, location=(0.3 * (number % 2), 0.1 * number, 0))
-
-
 @pytest.mark.parametrize("settings", STRIPS)
 def test_an_object_in_a_strip_is_read_within_a_millimetre_at_every_eighth(saved, scene, settings: dict) -> None:
-    keyed_object()
-    in_a_strip(bpy.data.objects["Tool"], 1, **settings)
-    strip = bpy.data.objects["Tool"].animation_data.nla_tracks[0].strips[0]
+    """The object is keyed on every third frame with Blender's default easing, as an animator blocks it out."""
+    tool = added("Tool")
+    for number, frame in enumerate(range(1, 32, 3)):
+        key(tool, frame, location=(0.3 * (number % 2), 0.1 * number, 0))
+    strip = in_a_strip(tool, **settings)
     frames = np.arange(np.ceil(8 * strip.frame_start) + 1, 8 * strip.frame_end - 1) / 8
     if "repeat" in settings:
         turns = strip.frame_start + 30 * strip.scale * np.arange(1, 3)
         frames = frames[np.abs(frames - turns[:, None]).min(axis=0) > 0.05]
-    expected = truth("Tool", frames)
+    (expected,) = in_blender(frames, lambda depsgraph: [tool.evaluated_get(depsgraph).matrix_world.translation])
     result = read(saved())
     made = interpolate(result.times, result.poses, frames / FPS, "lerp_slerp").positions
     assert np.linalg.norm(made - expected, axis=-1).max() < WITHIN
 
 
 def test_keys_off_whole_frames_are_samples(saved) -> None:
-    tool = empty("Tool")
+    tool = added("Tool")
     for frame, x in ((1, 0), (2.4, 1), (2.7, -1), (6, 0)):
         key(tool, frame, location=(x, 0, 0))
     linear(tool)
@@ -129,7 +114,7 @@ def test_keys_off_whole_frames_are_samples(saved) -> None:
 
 
 def test_angles_that_flip_between_frames_are_no_motion(saved) -> None:
-    tool = empty("Tool")
+    tool = added("Tool")
     for frame in range(1, 21):
         key(tool, frame, rotation_euler=(0, 0, np.radians((170 + 2 * frame + 180) % 360 - 180)))
     linear(tool)
@@ -139,7 +124,7 @@ def test_angles_that_flip_between_frames_are_no_motion(saved) -> None:
 
 
 def test_what_swings_too_fast_is_warned_of_with_how_far_it_is_off(saved) -> None:
-    tool = empty("Tool")
+    tool = added("Tool")
     for frame in (1, 11):
         key(tool, frame, location=(frame, 0, 0))
     noise = fcurves(tool)[0].modifiers.new("FNGENERATOR")

@@ -17,13 +17,15 @@ from rigid_motion_batch.recordings.scene_bodies import jointed, parents_among
 from rigid_motion_batch.silencing import silenced
 from tests.blank import blank
 from tests.gltf.making import Making
-from tests.scripts.recordings.blends import FPS, empty, key, on_frames
+from tests.scripts.recordings.blends import FPS, added, in_blender, key, on_frames
 from tests.scripts.recordings.glbs import turning
 from tests.scripts.recordings.skeletons import export
 
 bpy = pytest.importorskip("bpy")
 
 FRAMES = range(1, 21)
+
+TIMES = np.arange(31) / 30
 
 ENDINGS = (".glb", ".gltf", ".vrma", ".fbx")
 
@@ -35,39 +37,33 @@ def prop(name: str, number: int, **settings: object) -> bpy.types.Object:
     """Add a triangle mesh that flies and turns."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata([(0, 0, 0), (0.2, 0, 0), (0, 0.1, 0.3)], [], [(0, 1, 2)])
-    obj = bpy.data.objects.new(name, mesh)
-    bpy.context.scene.collection.objects.link(obj)
-    for setting, value in settings.items():
-        setattr(obj, setting, value)
-    moved(obj, number)
-    return obj
+    return moved(added(name, mesh, **settings), number)
 
 
-def moved(obj: bpy.types.Object, number: int) -> None:
+def moved(obj: bpy.types.Object, number: int) -> bpy.types.Object:
     obj.rotation_mode = "QUATERNION"
     for frame in FRAMES:
         half = 0.04 * frame + 0.3 * number
         turn = (np.cos(half), 0.6 * np.sin(half), 0.0, 0.8 * np.sin(half))
         key(obj, frame, location=(0.05 * frame, 0.3 * number, np.sin(0.2 * frame)), rotation_quaternion=turn)
+    return obj
 
 
 def stage(path: Path) -> Path:
     """Write a file with three props, one parented to another and one to a scaled parent at rest, and a camera."""
     first = prop("Cup", 0)
     prop("Spoon", 1, parent=first)
-    prop("Ring", 2, parent=empty("Holder", location=(0, 0, 1), scale=(0.1, 0.1, 0.1), rotation_euler=(0.3, 0, 0.5)))
-    camera = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
-    bpy.context.scene.collection.objects.link(camera)
-    moved(camera, 3)
+    prop("Ring", 2, parent=added("Holder", location=(0, 0, 1), scale=(0.1, 0.1, 0.1), rotation_euler=(0.3, 0, 0.5)))
+    moved(added("Eye", bpy.data.cameras.new("Eye")), 3)
     return exported(path)
 
 
 def figure(path: Path) -> Path:
     """Write a file with a body of six nodes without a skin, below a node at rest, and a prop."""
     parents = {"Hips": "Place", "Spine": "Hips", "Head": "Spine", "Arm": "Spine", "Leg": "Hips", "Foot": "Leg"}
-    nodes = {"Place": empty("Place", location=(0, 3, 0))}
+    nodes = {"Place": added("Place", location=(0, 3, 0))}
     for number, (name, parent) in enumerate(parents.items()):
-        nodes[name] = empty(name, parent=nodes[parent], rotation_mode="QUATERNION", location=(0.1, 0, 0.3))
+        nodes[name] = added(name, parent=nodes[parent], rotation_mode="QUATERNION", location=(0.1, 0, 0.3))
         for frame in FRAMES:
             half = 0.03 * frame * (-1) ** number
             key(nodes[name], frame, rotation_quaternion=(np.cos(half), np.sin(half), 0, 0))
@@ -94,19 +90,15 @@ def imported(path: Path, names: Sequence[str]) -> dict[str, Poses]:
     bpy.context.scene.render.fps = FPS
     with silenced():
         (bpy.ops.import_scene.fbx if path.suffix == ".fbx" else bpy.ops.import_scene.gltf)(filepath=str(path))
-    seen, first = [], int(min(action.frame_range[0] for action in bpy.data.actions))
-    for frame in range(first, first + len(FRAMES)):
-        bpy.context.scene.frame_set(frame)
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        objects = [bpy.data.objects[name].evaluated_get(depsgraph) for name in names]
-        seen.append(
-            [(np.array(place), np.array(turn)) for place, turn, _ in (o.matrix_world.decompose() for o in objects)]
-        )
+
+    def show(depsgraph: bpy.types.Depsgraph) -> list:
+        shown = (bpy.data.objects[name].evaluated_get(depsgraph) for name in names)
+        return [np.concatenate(obj.matrix_world.decompose()[:2]) for obj in shown]
+
+    first = int(min(action.frame_range[0] for action in bpy.data.actions))
+    seen = in_blender(range(first, first + len(FRAMES)), show)
     blank()
-    return {
-        name: Poses(np.stack([row[number][0] for row in seen]), np.stack([row[number][1] for row in seen]))
-        for number, name in enumerate(names)
-    }
+    return {name: Poses(rows[:, :3], rows[:, 3:]) for name, rows in zip(names, seen, strict=True)}
 
 
 def assert_same(result: Trajectory, expected: Poses) -> None:
@@ -119,6 +111,13 @@ def assert_same(result: Trajectory, expected: Poses) -> None:
     assert (result.metres_per_unit, result.rate, result.warnings) == (1.0, float(FPS), ())
 
 
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> Making:
+    """A glTF to fill in, which is read without Blender."""
+    monkeypatch.setitem(sys.modules, "bpy", None)
+    return Making()
+
+
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_what_moves_alone_is_a_rigid_body_where_blender_imports_it(scene, tmp_path: Path, ending: str) -> None:
     path = stage(tmp_path / f"stage{ending}")
@@ -126,17 +125,15 @@ def test_what_moves_alone_is_a_rigid_body_where_blender_imports_it(scene, tmp_pa
     expected = imported(path, names)
     recording = read_trajectories(str(path))
     assert f"{path} holds 4 bodies; took {recording.trajectories[0].name}; others: " in recording.note
+    every = {single.name: single for single in read_trajectories(f"{path}:*").trajectories}
+    assert every.keys() == {*names} == {*inspect(str(path)).bodies}
     for name in names:
+        assert_same(every[name], expected[name])
         (single,) = read_trajectories(f"{path}:{name.lower()}").trajectories
         assert single.name == name
         assert_same(single, expected[name])
-    every = {single.name: single for single in read_trajectories(f"{path}:*").trajectories}
-    assert every.keys() == {*names}
-    for name in names:
-        assert_same(every[name], expected[name])
     (holder,) = read_trajectories(f"{path}:Holder").trajectories
     assert np.ptp(holder.poses.positions, axis=0).max() == 0.0, "it rests, and can be had by its name"
-    assert {*inspect(str(path)).bodies} == {*names}
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
@@ -178,28 +175,8 @@ def test_each_object_has_its_own_animation_of_those_that_blender_exports(scene, 
     )
 
 
-def test_a_prop_needs_no_blender(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made, times = Making(), np.arange(40) / 20
-    made.json["nodes"] = [{"name": "Prop"}]
-    places = np.column_stack((0.25 * np.sin(times), 1.4 - 0.4 * np.cos(times), np.sin(3 * times)))
-    turns = turning(times, 1.5 * np.sin(times), (0.0, 0.6, 0.8))
-    own = made.times(times)
-    made.channel(0, "translation", own, places)
-    made.channel(0, "rotation", own, turns)
-    path = made.write(tmp_path / "prop.gltf")
-    monkeypatch.setitem(sys.modules, "bpy", None)
-    (single,) = read_trajectories(str(path)).trajectories
-    x, y, z, w = turns.T
-    assert (len(single.times), single.rate) == (40, 20.0)
-    np.testing.assert_allclose(
-        single.poses.positions, np.column_stack((places[:, 0], -places[:, 2], places[:, 1])), atol=1e-6
-    )
-    np.testing.assert_allclose(single.poses.quaternions, np.column_stack((w, x, -z, y)), atol=1e-6)
-
-
-def test_a_vrma_names_its_joints_itself(tmp_path: Path) -> None:
+def test_a_vrma_names_its_joints_itself(made: Making, tmp_path: Path) -> None:
     """Without the VRMA names, three moving joints would be too few for a body, and the last joint does not move."""
-    made, times = Making(), np.arange(31) / 30
     made.json["nodes"] = [
         *({"name": name, "translation": [0, 0.5, 0], "children": [child]} for child, name in enumerate("abcd", 1)),
         {"name": "e", "translation": [0, 0.5, 0]},
@@ -207,55 +184,52 @@ def test_a_vrma_names_its_joints_itself(tmp_path: Path) -> None:
     bones = {name: {"node": node} for node, name in ((0, "hips"), (1, "spine"), (2, "chest"), (3, "neck"), (4, "head"))}
     made.json["extensions"] = {"VRMC_vrm_animation": {"specVersion": "1.0", "humanoid": {"humanBones": bones}}}
     made.uses("VRMC_vrm_animation")
-    made.channel(1, "rotation", made.times(times), turning(times, times))
+    made.channel(1, "rotation", made.times(TIMES), turning(TIMES, TIMES))
     (body,) = read_trajectories(str(made.write(tmp_path / "wave.glb").rename(tmp_path / "wave.vrma"))).trajectories
     assert body.rest_body.joints == tuple("abcde")
     tip = body.rest_body.skeleton.in_root_space(body.poses).positions[4]
     np.testing.assert_allclose(
-        tip, np.column_stack((-1.5 * np.sin(times), 0 * times, 1 + 1.5 * np.cos(times))), atol=1e-6
+        tip, np.column_stack((-1.5 * np.sin(TIMES), 0 * TIMES, 1 + 1.5 * np.cos(TIMES))), atol=1e-6
     )
 
 
-def test_takes_of_other_nodes_play_along_and_others_are_told(tmp_path: Path) -> None:
+def test_takes_of_other_nodes_play_along_and_others_are_told(made: Making, tmp_path: Path) -> None:
     """Some exporters write one animation per object."""
-    made, times = Making(), np.arange(31) / 30
     made.json["nodes"] = [{"name": "Cart", "children": [1]}, {"name": "Wheel", "translation": [1, 0, 0]}]
-    places = np.column_stack((times, 0 * times, 0 * times))
-    made.channel(0, "translation", made.times(times), places, clip=0)
-    made.channel(1, "rotation", made.times(times), turning(times, 2 * times), clip=1)
-    made.channel(0, "translation", made.times(times), 2 * places, clip=2)
+    places = np.column_stack((TIMES, 0 * TIMES, 0 * TIMES))
+    made.channel(0, "translation", made.times(TIMES), places, clip=0)
+    made.channel(1, "rotation", made.times(TIMES), turning(TIMES, 2 * TIMES), clip=1)
+    made.channel(0, "translation", made.times(TIMES), 2 * places, clip=2)
     path = made.write(tmp_path / "cart.glb")
     wheel = read_trajectories(f"{path}:Wheel")
-    np.testing.assert_allclose(wheel.trajectories[0].poses.positions[:, 0], 1 + times, atol=1e-6)
+    np.testing.assert_allclose(wheel.trajectories[0].poses.positions[:, 0], 1 + TIMES, atol=1e-6)
     assert np.degrees(angle_between(*wheel.trajectories[0].poses.quaternions[[0, -1]])) == pytest.approx(114.6, abs=0.1)
     assert wheel.note == "took its take Take0, Take1; others: Take2"
 
 
 def test_a_prop_that_grows_has_scales_and_one_in_a_file_of_centimetres_has_none(tmp_path: Path) -> None:
-    times = np.arange(31) / 30
-    for size, scales in ((1.0, np.column_stack([1 + times] * 3)), (0.01, None)):
+    for size, scales in ((1.0, np.column_stack([1 + TIMES] * 3)), (0.01, None)):
         made = Making()
         made.json["nodes"] = [{"name": "Root", "scale": [size] * 3, "children": [1]}, {"name": "Balloon"}]
-        made.channel(1, "translation", made.times(times), np.column_stack((times, times, times)) / size)
+        made.channel(1, "translation", made.times(TIMES), np.column_stack((TIMES, TIMES, TIMES)) / size)
         if scales is not None:
-            made.channel(1, "scale", made.times(times), scales)
+            made.channel(1, "scale", made.times(TIMES), scales)
         (balloon,) = read_trajectories(str(made.write(tmp_path / "balloon.glb"))).trajectories
-        np.testing.assert_allclose(balloon.poses.positions[:, 2], times, atol=1e-6)
+        np.testing.assert_allclose(balloon.poses.positions[:, 2], TIMES, atol=1e-6)
         if scales is None:
             assert balloon.poses.scales is None
         else:
-            np.testing.assert_allclose(balloon.poses.scales, 1 + times, atol=1e-6)
+            np.testing.assert_allclose(balloon.poses.scales, 1 + TIMES, atol=1e-6)
 
 
-def test_a_mesh_that_is_compressed_leaves_a_body_without_its_skin(tmp_path: Path) -> None:
-    made, times = Making(), np.arange(31) / 30
+def test_a_mesh_that_is_compressed_leaves_a_body_without_its_skin(made: Making, tmp_path: Path) -> None:
     made.json["nodes"] = [{"name": "Joint"}, {"name": "Skin", "mesh": 0, "skin": 0}]
     made.json["scenes"] = [{"nodes": [0, 1]}]
     made.json["skins"] = [{"joints": [0]}]
     attributes = {"POSITION": made.accessor(np.zeros((3, 3), dtype="<f4"))}
     compressed = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}}
     made.json["meshes"] = [{"primitives": [{"attributes": attributes, "extensions": compressed}]}]
-    made.channel(0, "rotation", made.times(times), turning(times, times))
+    made.channel(0, "rotation", made.times(TIMES), turning(TIMES, TIMES))
     recording = read_trajectories(str(made.write(tmp_path / "body.glb")))
     assert recording.trajectories[0].rest_body.skin is None
     assert recording.note == "without its skin: it is compressed by Draco"
@@ -280,28 +254,23 @@ def test_nodes_in_any_order_hang_on_the_nearest_that_counts() -> None:
         assert parents_among(parents, own).tolist() == [above[node] for node in own]
 
 
-def test_what_is_named_and_not_there_is_told_with_what_is(tmp_path: Path, refusal) -> None:
-    made, times = Making(), np.arange(31) / 30
-    made.json["nodes"] = [{"name": "Cup"}, {"name": "cup"}, {"name": "Table"}]
-    made.channel(0, "translation", made.times(times), np.column_stack((times, times, times)))
-    path = made.write(tmp_path / "cup.glb")
-    assert refusal(f"{path}:Fork")[1] == "no body named 'Fork'; it holds Cup, cup, Table"
+def test_nodes_have_names_of_their_own_and_what_is_named_and_not_there_is_told(
+    made: Making, tmp_path: Path, refusal
+) -> None:
+    made.json["nodes"] = [{}, {"name": 3}, {"name": "Cup"}, {"name": "Cup"}, {"name": "cup"}, {"name": "Table"}]
+    for node in range(5):
+        made.channel(node, "translation", made.times(TIMES), np.column_stack((TIMES, TIMES, node * TIMES)))
+    path = made.write(tmp_path / "cups.glb")
+    names = ["Node_0", "Node_1", "Cup", "Cup.001", "cup"]
+    assert [single.name for single in read_trajectories(f"{path}:*").trajectories] == names
+    assert refusal(f"{path}:Fork")[1] == "no body named 'Fork'; it holds Node_0, Node_1, Cup, Cup.001, cup, Table"
     assert refusal(f"{path}:CUP")[1].startswith("no body named 'CUP', and 2 that differ from it in their case alone; ")
 
 
-def test_nodes_without_names_have_some(tmp_path: Path) -> None:
-    made, times = Making(), np.arange(31) / 30
-    made.json["nodes"] = [{}, {"name": 3}, {"name": "Cup"}, {"name": "Cup"}]
-    for node in range(4):
-        made.channel(node, "translation", made.times(times), np.column_stack((times, times, node * times)))
-    recording = read_trajectories(f"{made.write(tmp_path / 'cups.glb')}:*")
-    assert [single.name for single in recording.trajectories] == ["Node_0", "Node_1", "Cup", "Cup.001"]
-
-
-def test_two_keys_at_one_time_are_a_cut(tmp_path: Path) -> None:
-    made, times = Making(), np.array([0.0, 0.5, 0.5, 1.0])
+def test_two_keys_at_one_time_are_a_cut(made: Making, tmp_path: Path) -> None:
+    cut = np.array([0.0, 0.5, 0.5, 1.0])
     made.json["nodes"] = [{"name": "Cup"}]
-    made.channel(0, "translation", made.times(times), np.array([[0, 0, 0], [0.1, 0, 0], [2, 0, 0], [2.1, 0, 0]]))
+    made.channel(0, "translation", made.times(cut), np.array([[0, 0, 0], [0.1, 0, 0], [2, 0, 0], [2.1, 0, 0]]))
     (cup,) = read_trajectories(str(made.write(tmp_path / "cup.glb"))).trajectories
     for moment, place in ((0.4997, 0.0999), (0.5, 2.0), (0.75, 2.05)):
         sample = np.searchsorted(cup.times, moment + 1e-9) - 1
@@ -310,10 +279,9 @@ def test_two_keys_at_one_time_are_a_cut(tmp_path: Path) -> None:
     assert "it jumps" in cup.warnings[0].text
 
 
-def test_what_moves_in_an_unknown_way_is_told(tmp_path: Path) -> None:
-    made, times = Making(), np.arange(31) / 30
+def test_what_moves_in_an_unknown_way_is_told(made: Making, tmp_path: Path) -> None:
     follows = {"VRMC_node_constraint": {"constraint": {"rotation": {"source": 0}}}}
     made.json["nodes"] = [{"name": "Cup"}, {"name": "Lid", "extensions": follows}]
-    made.channel(0, "rotation", made.times(times), turning(times, times))
+    made.channel(0, "rotation", made.times(TIMES), turning(TIMES, TIMES))
     recording = read_trajectories(str(made.write(tmp_path / "cup.glb")))
     assert recording.note == "node Lid follows others by VRMC_node_constraint, which is not worked out here"
