@@ -42,29 +42,25 @@ def swinging_body(
     phases = random.uniform(2.0, 6.0, (len(BONES), 1)) * since
     poses = Poses(
         np.tile(np.array([offset for _, offset in BONES.values()], dtype=float)[:, None], (1, len(times), 1)),
-        turns(0.8 * np.sin(phases), random.normal(size=(len(BONES), 1, 3)) * np.ones((1, len(times), 1))),
+        turns(0.8 * np.sin(phases), random.normal(size=(len(BONES), 1, 3))),
     )
     poses.positions[0] += 60.0 * np.stack((0.0 * since, 0.2 * np.sin(5.0 * since), since), axis=-1)
     glove = list(BONES).index("Glove")
     poses.quaternions[glove] = poses.quaternions[glove, :1]
     # The arm swings from the first moment on.
     arm = list(BONES).index("Arm")
-    poses.quaternions[arm] = turns(np.sin(4.0 * times), np.tile((0.0, 0.3, 1.0), (len(times), 1)))
-    clip = Clip(name, f"{name}.bvh", "opengl", times, poses, (), 0.01)
-    return replace(clip, rest_body=rest_body_of(clip, joints))
+    poses.quaternions[arm] = turns(np.sin(4.0 * times), np.array((0.0, 0.3, 1.0)))
+    rest_body = rest_body_of(joints, PARENTS, poses[:, 0], np.tile((0.0, 10.0, 0.0), (len(joints), 1)))
+    return Clip(name, f"{name}.bvh", "opengl", times, poses, (), 0.01, rest_body=rest_body)
 
 
-def rest_body_of(clip: Clip, joints: Sequence[str]) -> RestBody:
-    """Return the rest body of a clip, at rest in its first pose, with these joint names."""
-    tails = np.tile((0.0, 10.0, 0.0), (len(joints), 1))
-    unplaced = RestBody(tuple(joints), PARENTS, Poses(np.zeros((len(joints), 3)), np.eye(4)[[0] * len(joints)]), tails)
-    return replace(unplaced, rest=unplaced.skeleton.in_root_space(clip.poses)[:, 0])
+def rest_body_of(joints: Sequence[str], parents: np.ndarray, local: Poses, tails: np.ndarray) -> RestBody:
+    """Return the rest body of joints with these rest poses in their parents' spaces."""
+    unplaced = RestBody(tuple(joints), parents, local, tails)
+    return replace(unplaced, rest=unplaced.skeleton.in_root_space(local[:, None])[:, 0])
 
 
 def still_body(name: str = "statue") -> Clip:
     """Return a clip of the same body standing still."""
     clip = swinging_body(name)
-    poses = Poses(
-        *(np.repeat(some[:, :1], len(clip.times), axis=1) for some in (clip.poses.positions, clip.poses.quaternions))
-    )
-    return replace(clip, poses=poses)
+    return replace(clip, poses=clip.poses[:, np.zeros(len(clip.times), dtype=int)])

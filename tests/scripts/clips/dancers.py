@@ -1,14 +1,15 @@
 """Synthetic clips of dancing bodies, for tests."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion.motion.poses import placed
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.rest_bodies import RestBody, Skin
+from rigid_motion_batch.recordings.rest_bodies import Skin
+from tests.scripts.clips.bodies import rest_body_of
 
 JOINTS = ("Hips", "Spine", "Head", "Left leg", "Right leg", "Left foot")
 PARENTS = (-1, 0, 1, 0, 0, 3)
@@ -37,18 +38,11 @@ def dancing_clip(
     places = np.repeat(np.array(OFFSETS, dtype=float)[:, None], len(times), axis=1)
     if 0 not in still:
         places[0] += np.stack((walked * times / 1.2, 0.1 * np.sin(3.0 * times), 0.05 * np.sin(7.0 * times)), axis=-1)
-    local = Poses(np.array(OFFSETS, dtype=float), at_rest)
-    rest = Poses(np.zeros((count, 3)), np.zeros((count, 4)))
-    for joint, parent in enumerate(PARENTS):
-        rest[joint] = local[joint] if parent < 0 else placed(rest[parent], local[joint])
     scale = 1.0 / metres_per_unit
-    rest_body = RestBody(
-        JOINTS,
-        np.array(PARENTS),
-        Poses(rest.positions * scale, rest.quaternions),
-        np.array(TAILS, dtype=float) * scale,
-        _skin(rest, scale) if skin else None,
-    )
+    local = Poses(np.array(OFFSETS, dtype=float) * scale, at_rest)
+    rest_body = rest_body_of(JOINTS, np.array(PARENTS), local, np.array(TAILS, dtype=float) * scale)
+    if skin:
+        rest_body = replace(rest_body, skin=_skin(rest_body.rest, scale))
     poses = Poses(places * scale, turns)
     return Clip("dance", "dance.bvh", axes, times, poses, (), metres_per_unit, rest_body=rest_body)
 
@@ -63,5 +57,5 @@ def _skin(rest: Poses, scale: float) -> Skin:
     carriers[:, 1] = np.repeat(np.maximum(PARENTS, 0), 4)
     weights = np.tile((2.0 / 3.0, 1.0 / 3.0, 0.0, 0.0), (4 * count, 1))
     weights[:4] = (1.0, 0.0, 0.0, 0.0)
-    vertices = (rest.positions[:, None] + around).reshape(-1, 3) * scale
+    vertices = (rest.positions[:, None] + around * scale).reshape(-1, 3)
     return Skin(vertices, np.concatenate([faces + 4 * joint for joint in range(count)]), carriers, weights)
