@@ -57,7 +57,7 @@ def swinging_body(
 def rest_body_of(joints: Sequence[str], parents: np.ndarray, local: Poses, tails: np.ndarray) -> RestBody:
     """Return the rest body of joints with these rest poses in their parents' spaces."""
     unplaced = RestBody(tuple(joints), parents, local, tails)
-    return replace(unplaced, rest=unplaced.skeleton.in_root_space(local[:, None])[:, 0])
+    return replace(unplaced, rest=unplaced.skeleton.in_root_space(local))
 
 
 def still_body(name: str = "statue") -> Clip:

@@ -1,5 +1,6 @@
-"""Tests of body files found in practice: units, still roots, positions besides OFFSETs, names with spaces."""
+"""Tests of bodies found in practice: units, still roots, positions besides OFFSETs, damaged rest poses, spaces."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +8,18 @@ import pytest
 
 from rigid_motion_batch.recordings import ReadingOptions, Trajectory, read_clips, read_trajectories
 from rigid_motion_batch.recordings.bvh_writing import write_bvh
+from rigid_motion_batch.recordings.clip_reading import make_clip
+from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.inspecting import inspect
-from rigid_motion_batch.recordings.rest_bodies import carrying, part_of_body, unit_above_floor
+from rigid_motion_batch.recordings.rest_bodies import (
+    Skin,
+    carrying,
+    part_of_body,
+    repaired,
+    size_of,
+    unit_above_floor,
+)
+from tests.scripts.clips.bodies import JOINTS, swinging_body
 
 FILES = Path(__file__).parent / "bodies"
 
@@ -31,58 +42,45 @@ def test_a_root_that_stands_still_is_not_what_is_measured() -> None:
 
 
 # A root, hips with two legs and a spine, and two other children of the root.
-PARENTS = np.array([-1, 0, 1, 1, 1, 0, 0])
-STANDING = np.array([[0, 0, 0], [5, 0, 0.9], [5, 0.1, 0], [5, -0.1, 0], [5, 0, 1.7], [8, 3, 0], [-2, 0, 2]])
+PARENTS = [-1, 0, 1, 1, 1, 0, 0]
+STANDING = [[0, 0, 0], [5, 0, 0.9], [5, 0.1, 0], [5, -0.1, 0], [5, 0, 1.7], [8, 3, 0], [-2, 0, 2]]
+NEAR = [*STANDING[:5], [6.5, 0, 0], [5.5, 0, 0.5]]
+SITTING = [-1, 0, 1, 0, 0], [[0, 0, 0], [0, 0, 0.5], [0.3, 0, 0.6], [0.4, 0.1, 0], [0.4, -0.1, 0.0]]
 
 
 @pytest.mark.parametrize(
-    ("moving", "aside"),
+    ("parents", "standing", "moving", "aside"),
     [
-        ([], []),
-        ([1, 2, 3, 4], [0, 5, 6]),
-        ([1, 2, 3, 4, 5, 6], [0]),
-        ([0, 1, 2, 3, 4, 5, 6], []),
-        ([2, 4], []),
+        (PARENTS, STANDING, [], []),
+        (PARENTS, STANDING, [1, 2, 3, 4], [0, 5, 6]),
+        (PARENTS, STANDING, [1, 2, 3, 4, 5, 6], [0]),
+        (PARENTS, STANDING, [0, 1, 2, 3, 4, 5, 6], []),
+        (PARENTS, STANDING, [2, 4], []),
+        (PARENTS, NEAR, [1, 2, 3, 4], [0]),
+        (*SITTING, [2], []),
     ],
-    ids=["nothing", "one of several", "all of several", "the root too", "hips that stay"],
+    ids=["nothing", "one of several", "all", "the root too", "hips that stay", "near what stands", "arms of who sits"],
 )
 def test_a_root_that_stands_is_aside_with_what_stands_far_from_all_that_moves(
-    moving: list[int], aside: list[int]
+    parents: list[int], standing: list[list[float]], moving: list[int], aside: list[int]
 ) -> None:
-    places = np.repeat(STANDING[:, None], 100, axis=1)
+    places = np.repeat(np.array(standing, dtype=float)[:, None], 100, axis=1)
     places[moving, :, 0] += np.linspace(0.0, 2.0, 100)
-    assert np.flatnonzero(carrying(PARENTS, places)).tolist() == aside
-    assert np.flatnonzero(~part_of_body(PARENTS, places)).tolist() == aside
-
-
-def test_what_stands_near_to_a_body_is_seen_with_it() -> None:
-    places = np.repeat(STANDING[:, None], 100, axis=1)
-    places[5:] = [[[5.5, 0.0, 0.0]], [[4.5, 0.0, 0.5]]]
-    places[1:5, :, 0] += np.linspace(-1.0, 1.0, 100)
-    assert np.flatnonzero(carrying(PARENTS, places)).tolist() == [0]
-
-
-def test_hips_that_sit_are_a_part_of_the_body_whose_arms_move() -> None:
-    parents = np.array([-1, 0, 1, 0, 0])
-    places = np.repeat(
-        np.array([[0, 0, 0], [0, 0, 0.5], [0.3, 0, 0.6], [0.4, 0.1, 0], [0.4, -0.1, 0.0]])[:, None], 9, axis=1
-    )
-    places[2, :, 2] += np.linspace(0.0, 0.3, 9)
-    assert not carrying(parents, places).any()
+    assert np.flatnonzero(carrying(np.array(parents), places)).tolist() == aside
+    assert np.flatnonzero(~part_of_body(np.array(parents), places)).tolist() == aside
 
 
 def test_the_upper_half_of_a_body_is_not_in_inches_where_its_hips_would_be_higher_than_those_of_giants() -> None:
     body, _ = whole("upper_body_cm.bvh")
     assert body.metres_per_unit == 0.01
     assert "in inches, all of it would be more than 2.24 m up" in body.remark
-    (hand,) = read_trajectories(f"{FILES / 'upper_body_cm.bvh'}:LeftHand").trajectories
-    assert (hand.metres_per_unit, hand.remark) == (0.01, body.remark), "a joint is in the unit of its body"
-    assert (
-        inspect(f"{FILES / 'upper_body_cm.bvh'}:LeftHand").contents[0].unit.known_from
-        == "guessed from the size of the body"
-    )
-    (scaled,) = read_trajectories(f"{FILES / 'upper_body_cm.bvh'}:LeftHand", ReadingOptions(scale=0.1)).trajectories
-    assert scaled.metres_per_unit == 0.1
+    hand = f"{FILES / 'upper_body_cm.bvh'}:LeftHand"
+    for options, metres, known in (
+        (ReadingOptions(), 0.01, "guessed from the size of the body"),
+        (ReadingOptions(scale=0.1), 0.1, "as --scale says"),
+    ):
+        unit = inspect(hand, options=options).contents[0].unit
+        assert (unit.metres, unit.known_from) == (metres, known), "a joint is in the unit of its body"
 
 
 @pytest.mark.parametrize(
@@ -128,3 +126,44 @@ def test_a_name_with_spaces_finds_its_joint_and_is_written_as_it_is(tmp_path: Pa
     assert again.rest_body.joints == clip.rest_body.joints == ("Bip01 Pelvis", "Bip01 Neck")
     np.testing.assert_allclose(again.poses.positions, clip.poses.positions, atol=1e-5)
     np.testing.assert_allclose(again.poses.quaternions, clip.poses.quaternions, atol=1e-7)
+
+
+@pytest.fixture
+def clip() -> Clip:
+    """A clip with a skin of one triangle."""
+    clip = swinging_body()
+    skin = Skin(np.eye(3), np.array([[0, 1, 2]]), np.zeros((3, 4), dtype=int), np.eye(4)[[0, 0, 0]])
+    return replace(clip, rest_body=replace(clip.rest_body, skin=skin))
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e38])
+def test_a_joint_that_is_nowhere_at_rest_has_no_bone_and_is_told(clip: Clip, number: float) -> None:
+    rest_body = clip.rest_body
+    rest_body.tails[2, 1] = number
+    rest_body.rest.positions[5, 0] = number
+    rest_body.skin.vertices[1, 1] = number
+    rest_body = replace(rest_body, ends=np.full(len(JOINTS), 0.1))
+    sound, done = repaired(rest_body)
+    assert sound.ends.tolist() == [0.0 if joint in (2, 5) else 0.1 for joint in range(len(JOINTS))]
+    assert done == (
+        "drew no bones for joints that are nowhere at rest (2: Head, Glove)",
+        "left out a skin with numbers that are missing, not finite or too large",
+    )
+    assert sound.skin is None
+    for joint in range(len(JOINTS)):
+        for result, before in ((sound.tails, rest_body.tails), (sound.rest.positions, rest_body.rest.positions)):
+            assert np.array_equal(result[joint], [0, 0, 0] if joint in (2, 5) else before[joint])
+    trajectory = Trajectory("walk", clip.times, clip.poses, rest_body=rest_body)
+    made = make_clip(trajectory, "walk.fbx", "walk", "blender")
+    assert made.repairs == done
+    assert np.isfinite(made.rest_body.tails).all()
+
+
+def test_the_size_of_a_body_is_that_from_where_it_branches() -> None:
+    # A reference on the ground, the root of the body as its child, and an arm and a leg.
+    parents = np.array([-1, 0, 1, 1, 3])
+    places = np.array([[0, 0, 0], [0, 50, 0], [0, 51, 0], [0, 49.5, 0], [0, 49.2, 0.4]])
+    assert size_of(parents, places) == pytest.approx(1.8)
+    chain = np.array([-1, 0, 1])
+    assert size_of(chain, np.array([[0, 0, 0], [3.0, 0, 0], [3, 4, 0]])) == pytest.approx(4.0)
+    assert size_of(np.array([-1]), np.zeros((1, 3))) == 0.0
