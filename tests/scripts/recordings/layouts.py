@@ -57,6 +57,12 @@ class Layout:
     within: float = 1e-9
 
     @property
+    def options(self) -> list[str]:
+        """What is said, as options of a command."""
+        typed = {name: ",".join(map("=".join, said)) if name == "columns" else said for name, said in self.said.items()}
+        return [f"--{name.replace('_', '-')}={said}" for name, said in typed.items()]
+
+    @property
     def seconds(self) -> np.ndarray:
         """Seconds since the first sample."""
         return AT if self.counted or "frame_rate" in self.said else SECONDS

@@ -95,15 +95,9 @@ SOME = ("TUM", "KITTI", "w first, by numbers", "PlotJuggler", "COLMAP", "A-Frame
 @pytest.mark.parametrize("name", SOME)
 def test_what_is_compared_can_be_looked_into_and_reduced(write, tmp_path, name: str, capsys) -> None:
     layout = EVERY[name]
-    said = [f"--{option.replace('_', '-')}={as_typed(value)}" for option, value in layout.said.items()]
     source = write(layout.name, layout.text)
-    assert inspect_main([source, *said]) == 0
-    assert (
-        reduce_main([f"{source}:*", "--dry-run", "--tolerance", "1mm", "--output", str(tmp_path / "less"), *said]) == 0
-    )
+    assert inspect_main([source, *layout.options]) == 0
+    reducing = ["--dry-run", "--tolerance", "1mm", "--output", str(tmp_path / "less")]
+    assert reduce_main([f"{source}:*", *reducing, *layout.options]) == 0
     told = capsys.readouterr().out
     assert all(body in told for body in layout.bodies if len(layout.bodies) > 1), told
-
-
-def as_typed(value: object) -> str:
-    return ",".join(map("=".join, value)) if isinstance(value, list) else str(value)
