@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +16,13 @@ from rigid_motion_batch.cli import clean, reduce
 from rigid_motion_batch.recordings import ReadingOptions, read_clips, read_trajectories
 from tests.motion.test_cleaning import hand, rms, shaken
 from tests.scripts.bvh_bodies import write_body
-from tests.scripts.recordings.layouts import LAYOUTS
+from tests.scripts.recordings.test_layouts import EVERY
 
 TIMES, TRUTH = hand(3, 300)
+WALKING = """HIERARCHY
+ROOT Hips { OFFSET 0 0 0 CHANNELS 3 Xposition Yposition Zposition
+JOINT Thigh { OFFSET 0 0 0 CHANNELS 3 Zrotation Xrotation Yrotation
+JOINT Foot { OFFSET 0 -80 0 CHANNELS 0 End Site { OFFSET 0 -5 0 } } } }"""
 SPIKES = [80, 81, 200]
 
 
@@ -82,12 +88,10 @@ def test_what_was_cleaned_is_left_alone_and_what_is_done_is_not_done_again(shaky
 def test_a_body_comes_back_with_its_hierarchy_and_is_bounded_in_the_world(tmp_path, capsys):
     times = np.arange(300) / 60.0
     source = write_body(tmp_path / "body.bvh", times)
-    head, _, rows = source.read_text().partition("Frame Time: ")
-    rate, *lines = rows.splitlines()
-    random = np.random.default_rng(5)
-    numbers = np.array([list(map(float, line.split())) for line in lines])
-    numbers += random.normal(size=numbers.shape) * ([0.001] * 3 + [0.3] * (numbers.shape[1] - 3))
-    source.write_text("\n".join([f"{head}Frame Time: {rate}", *(" ".join(map(str, row)) for row in numbers), ""]))
+    head, rate, rows = re.split("(Frame Time: .*\n)", source.read_text())
+    numbers = np.loadtxt(rows.splitlines())
+    numbers += np.random.default_rng(5).normal(size=numbers.shape) * ([0.001] * 3 + [0.3] * (numbers.shape[1] - 3))
+    source.write_text("".join([head, rate, *(" ".join(map(str, row)) + "\n" for row in numbers)]))
     assert run(source, "--tolerance", "1cm", "--output", tmp_path / "made.bvh") == 0
     said = capsys.readouterr().err
     assert "at its worst joint" in said
@@ -103,14 +107,9 @@ def test_feet_that_stand_are_held_and_it_says_how_often_they_do(tmp_path, capsys
     hip = 20.0 * steps + 0.2 * random.normal(size=300)
     foot = 20.0 * (np.floor(steps) + np.clip(5.0 * np.mod(steps, 1.0) - 4.0, 0.0, 1.0)) + 10.0
     lean = np.degrees(np.arcsin((foot - hip) / 80.0))
-    parts = "ROOT Hips", "OFFSET 0 0 0", "CHANNELS 3 Xposition Yposition Zposition"
-    parts += "JOINT Thigh", "OFFSET 0 0 0", "CHANNELS 3 Zrotation Xrotation Yrotation"
-    parts += "JOINT Foot", "OFFSET 0 -80 0", "CHANNELS 0", "End Site", "OFFSET 0 -5 0"
-    lines = [line for part in parts for line in ([part] if part[0] in "OC" else [part, "{"])]
+    rows = "\n".join(f"{x} 90 0 {turn} 0 0" for x, turn in zip(hip, lean, strict=True))
     source, made = tmp_path / "walk.bvh", tmp_path / "walk-cleaned.bvh"
-    rows = [f"{x} 90 0 {turn} 0 0" for x, turn in zip(hip, lean, strict=True)]
-    times = "MOTION", "Frames: 300", "Frame Time: 0.0166667"
-    source.write_text("\n".join(["HIERARCHY", *lines, *"}}}}", *times, *rows, ""]))
+    source.write_text(f"{WALKING}\nMOTION\nFrames: 300\nFrame Time: 0.0166667\n{rows}\n")
     assert run(source) == 0
     assert "; contacts held: 5, feet slide by 16 mm there, before by 16 mm" in capsys.readouterr().err
     after, before = (poses_in_world(path).positions for path in (made, source))
@@ -136,18 +135,29 @@ def test_a_clock_that_jitters_is_written_in_steady_steps(tmp_path, capsys):
     assert np.abs(np.diff(read.times, 2)).max() < 1e-8
 
 
-@pytest.mark.parametrize("name", ["Record3D", "rows of positions and of rotations in turn"])
-def test_what_cannot_be_written_as_it_was_read_is_refused_and_becomes_a_table(tmp_path, capsys, name):
-    from tests.scripts.recordings.test_layouts import EVERY
+def listed() -> str:
+    """Return poses as lists without names, which jitter."""
+    content = json.loads(EVERY["Record3D"].text)
+    content["poses"] = (np.array(content["poses"]) + np.random.default_rng(1).normal(size=(24, 7)) * 1e-3).tolist()
+    return json.dumps(content)
 
-    layout = EVERY[name]
-    path = tmp_path / layout.name
-    path.write_text(str(layout.text))
-    said = [f"--{option.replace('_', '-')}={value}" for option, value in layout.said.items()]
-    moved = run(path, *said, "--output", tmp_path / f"x{path.suffix}")
-    assert moved in (0, 1)
-    if moved:
-        assert "name a table, --output x.csv" in capsys.readouterr().err
+
+@pytest.mark.parametrize(
+    ("name", "text", "table", "told"),
+    [
+        ("lists.json", listed(), "x.csv", "written so that it reads as it was meant"),
+        ("turns.csv", EVERY["rows of positions and of rotations in turn"].text, "x.tum", "written as it was read"),
+    ],
+)
+def test_what_cannot_be_written_as_it_was_read_is_refused_and_becomes_a_table(
+    tmp_path, capsys, name: str, text: str, table: str, told: str
+):
+    path = tmp_path / name
+    path.write_text(text)
+    assert run(path, "--output", tmp_path / f"x{path.suffix}") == 1
+    assert f"this cannot be {told}: name a table, --output {table}, or" in capsys.readouterr().err
+    assert run(path, "--output", tmp_path / table) == 0
+    assert shell_error(poses_of(tmp_path / table), poses_of(path)).max() < 0.01
 
 
 @pytest.mark.parametrize(
@@ -185,9 +195,9 @@ def test_keys_are_few_of_what_was_cleaned_and_both_promises_are_said(shaky, tmp_
 
 
 def test_all_bodies_of_a_table_are_cleaned(tmp_path, capsys):
-    layout = next(each for each in LAYOUTS.values() if len(each.bodies) == 2 and each.name.endswith(".csv"))
+    layout = EVERY["PlotJuggler"]
     path = tmp_path / layout.name
     path.write_text(str(layout.text))
-    assert run(path, *[f"--{name.replace('_', '-')}={value}" for name, value in layout.said.items()]) == 0
+    assert run(path) == 0
     said = capsys.readouterr().err
     assert all(f"{body}: " in said for body in layout.bodies)

@@ -107,7 +107,8 @@ def _write(beside: Path, recording: Recording, done: list[CleanedBody], how: Cle
             raise FileProblem(f"a table holds one rigid motion: name a {recording.path.suffix} file with --output")
         write_poses(beside, found.times, found.poses)
         return
-    way_out = f"name a table, --output {output.stem}.csv, or clean all of the file"
+    table = next(ending for ending in TABLES if ending != output.suffix.lower())
+    way_out = f"name a table, --output {output.stem}{table}, or clean all of the file"
     if (cells := done[0].trajectory.cells) is None:
         raise FileProblem(f"this cannot be written as it was read: {way_out}")
     numbers = np.full(cells.shape, np.nan)
