@@ -1,7 +1,6 @@
 """Tests of inspecting: the reported contents are right, and every problem comes with a way out."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,22 +19,6 @@ def log(rows: int = 300, rate: float = 90.0, scale: float = 1.0, up: int = 1, he
     half = np.pi / 4.0 * times
     columns = np.column_stack([times, *(scale * places), np.sin(half), 0.0 * half, 0.0 * half, np.cos(half)])
     return f"{header},qx,qy,qz,qw\n" + "".join(",".join(map(repr, row)) + "\n" for row in columns.tolist())
-
-
-def test_a_log_is_described(write) -> None:
-    result = inspect(source := write("hand.csv", log()))
-    (hand,) = result.contents
-    assert (result.source, result.format, result.bodies) == (source, "CSV with named columns", ("hand",))
-    assert result.bytes == Path(source).stat().st_size
-    assert (hand.joints, hand.scaled, hand.repairs, hand.warnings) == ((), False, (), ())
-    timing, size = hand.timing, hand.size
-    assert (timing.samples, timing.recorded, timing.even, timing.gaps) == (300, 300, True, 0)
-    assert (timing.rate, timing.seconds, timing.first) == pytest.approx((90.0, 299 / 90.0, 0.0))
-    assert size.extent == pytest.approx((0.4, 0.6, 0.6), abs=1e-3)
-    assert size.turning == pytest.approx(90.0)
-    assert size.turned == pytest.approx(180.0, abs=0.6)
-    assert 0.5 < size.speed < 1.2
-    assert 0.5 * timing.seconds < size.path < 1.2 * timing.seconds
 
 
 def test_what_jitters_is_measured_and_spikes_are_named(write, capsys) -> None:
@@ -94,7 +77,7 @@ def test_the_command_says_it_in_words(write, capsys) -> None:
     source = write("hand.csv", text)
     assert main([source, "--scale", "0.01", "--axes", "UNITY"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith(f"{source}: CSV with named columns, ")
+    assert lines[0] == f"{source}: CSV with named columns, 31.3 KB"
     said = "\n".join(line[13:] if line[2:13].strip() == "" else line for line in lines[1:])
     for expected in (
         "  axes       unity (left-handed, y up, z forward), as --axes says",
@@ -102,7 +85,8 @@ def test_the_command_says_it_in_words(write, capsys) -> None:
         "    samples  261 in 3.322 s",
         "    rate     90 a second, even: intervals from 11.1 to 444 ms, 1 gap",
         "    lengths  centimetres, as --scale says",
-        "    motion   0.4 x 0.6 x 0.6 m along x, y, z; ",
+        "    motion   0.4 x 0.6 x 0.6 m along x, y, z; 2.89 m of path; mostly below 1.08 m/s and 90",
+        "degrees/s; turns up to 180 degrees away from its first pose",
         "    repaired left gaps as they are",
         "    warning  no samples from 0.99 s to 1.43 s: no error is measured there",
         "-> take a part without it: --start and --end",
@@ -117,5 +101,7 @@ def test_the_exit_code_says_how_many_could_be_read(write, capsys) -> None:
     assert main([bad]) == 2
     assert main([good, bad, "--json"]) == 1
     result = json.loads(capsys.readouterr().out)
-    assert result[0]["contents"][0]["timing"]["samples"] == 300
+    (hand,) = result[0]["contents"]
+    assert hand["timing"] | {"samples": 300, "even": True, "gaps": 0} == hand["timing"]
+    assert (hand["joints"], hand["scaled"], hand["repairs"], hand["warnings"]) == ([], False, [], [])
     assert "no column named" in result[1]["error"]

@@ -45,6 +45,13 @@ def of_gltf(**content: object) -> str:
 
 NESTED = [*({"children": [node + 1]} for node in range(5000)), {}]
 VRM = {"VRMC_vrm_animation": {"humanoid": {"humanBones": {"hips": {"node": 0}}}}}
+CLOCKS = csv("time,clock," + HEADER[2:], 2.0 * SECONDS, SECONDS, *POSE)
+MANY = csv(f"id,{HEADER}", np.arange(1200), np.arange(1200) / 10.0, *np.eye(7)[[6] * 1200].T)
+OF_DEVICES = {"columns": [("device", "id"), ("t", "t")]}
+FAR_APART = [3e9 * row for row in range(9)]
+KEYS = range(18295873486192640, 18295873486192649)
+WHICH = "--columns rx=roll,ry=pitch,rz=yaw in ROS, rx=pitch,ry=yaw,rz=roll in Unity"
+SAID_THERE = "leave it out, as its files say that themselves"
 NO_DATE = "neither a number nor a date that can be read; write 2026-11-22T10:00:00.123, 10:00:00.123 or seconds"
 
 WRONG: dict[str, list[tuple]] = {
@@ -69,22 +76,12 @@ WRONG: dict[str, list[tuple]] = {
             "no column has a known name (found when, a, b, c, d, e, f, g); known are t, time, timestamp_ms; "
             "x, px, pos_x, position.x; qw, rot_w, rotation.w; or --columns",
         ),
-        (
-            zeros("frame,x,y,z,qx,qy,qz,qw"),
-            1,
-            "no column of time, only one that counts frames ('frame'); say how many frame",
-        ),
+        (zeros("frame" + HEADER[1:]), 1, "no column of time, only one that counts frames ('frame')…--frame-rate 90"),
         (zeros("t,left_x,left_y,left_z,button"), 1, "positions only, and rotations are needed (found t, left_x, left"),
         (zeros("t,x,y,z,rx,ry,rz"), 1, "rotations are Euler angles here (rx, ry, rz), and their order is not said; s"),
         ("t,Position,Rotation\n0,(0, 0, 0),(30, 0, 0)\n", 1, "rotations are Euler angles here (Rotation.x, Rotation.y"),
         (zeros(HEADER), 1, "no column named rx, ry, rz (found t, x, y, z, qx, qy, qz, qw); kn", {"euler": "XYZ"}),
-        (
-            zeros("t,x,y,z,roll,pitch,yaw"),
-            1,
-            "roll, pitch and yaw are about other axes…"
-            "--columns rx=roll,ry=pitch,rz=yaw in ROS, rx=pitch,ry=yaw,rz=roll in Unity",
-            {"euler": "ZYX"},
-        ),
+        (zeros("t,x,y,z,roll,pitch,yaw"), 1, f"roll, pitch and yaw are about other axes…{WHICH}", {"euler": "ZYX"}),
         (zeros(HEADER), 1, "no column is named 'when'; --columns t=NAME takes one", {"columns": [("t", "when")]}),
         (zeros("t [min],x,y,z,qx,qy,qz,qw"), 1, "'min' is not a known unit of time; --time-unit s, ms, us, ns"),
         (zeros("t,x [furlong],y,z,qx,qy,qz,qw"), 1, "'furlong' is not a known unit of length; say how many metres it"),
@@ -94,33 +91,16 @@ WRONG: dict[str, list[tuple]] = {
             "angles go up to 359, which are not radians; say so: --degrees;",
             {"euler": "XYZ"},
         ),
-        (
-            csv("time,clock," + HEADER[2:], 2.0 * SECONDS, SECONDS, *POSE),
-            1,
-            "two columns mean t and disagree ('time' lasts…say which with --columns t=NAME",
-        ),
-        (
-            csv(f"id,{HEADER}", np.arange(1200), np.arange(1200) / 10.0, *np.eye(7)[[6] * 1200].T),
-            1,
-            "more than 1000 different values in the column of devices; name another with --columns",
-            {"columns": [("device", "id"), ("t", "t")]},
-        ),
+        (CLOCKS, 1, "two columns mean t and disagree ('time' lasts…say which with --columns t=NAME"),
+        (MANY, 1, "more than 1000 different values in the column of devices; name another with --columns", OF_DEVICES),
         (
             f"{HEADER}\n" + MIXED.replace(" ", ","),
             1,
             "40 of 48 samples jump from one place to another and back, at 68.9 m/s: these are several…"
             "--columns device=NAME (found t, x, y, z, qx, qy, qz, qw), or split the file",
         ),
-        (
-            at_times(*(repr(3e9 * row) for row in range(9))),
-            1,
-            "t goes in steps of 3e+09: as seconds that is one sample in 3e+09 s…--time-unit s, ms, us, ns",
-        ),
-        (
-            at_times(*range(18295873486192640, 18295873486192649)),
-            1,
-            "t counts up by 1 from 18295873486192640: these are numbers of rows or keys",
-        ),
+        (at_times(*FAR_APART), 1, "t goes in steps of 3e+09: as seconds that is one sample…--time-unit s, ms, us, ns"),
+        (at_times(*KEYS), 1, f"t counts up by 1 from {KEYS[0]}: these are numbers of rows or keys, not times"),
     ],
     "dates.csv": [
         (next_date("2026-13-22T10:00:00"), 3, "t is '2026-13-22T10:00:00', not a date; delete this line if it is dam"),
@@ -128,21 +108,12 @@ WRONG: dict[str, list[tuple]] = {
         (next_date("2026-11-22T10:00:00.1234567891"), 3, "t is '2026-11-22T10:00:00.1234567891', not a date"),
         (next_date("2026-11-22T10:00:00\u0661"), 3, "t is '2026-11-22T10:00:00\u0661', not a date"),
         (next_date("2026-11-22T10:00:00+25:00"), 3, "t is '2026-11-22T10:00:00+25:00', not a date"),
-        (
-            next_date("2026-11-22T10:00:00Z"),
-            3,
-            "t is '2026-11-22T10:00:00Z', not a date without an offset from UTC as before",
-        ),
+        (next_date("2026-11-22T10:00:00Z"), 3, "t is '2026-11-22T10:00:00Z', not a date without an offset from UTC as"),
         (at_times("11/22/2026 10:00:00"), 2, f"t is '11/22/2026 10:00:00', {NO_DATE}"),
         (at_times("22.11.2026 10:00"), 2, f"t is '22.11.2026 10:00', {NO_DATE}"),
         (at_times("2026-11-22"), 2, f"t is '2026-11-22', {NO_DATE}"),
         (at_times("20261122T100000"), 2, f"t is '20261122T100000', {NO_DATE}"),
-        (
-            at_times("10:00:00Z", "10:00:01Z"),
-            1,
-            "--time-unit ms is for times that are numbers, and these have a clock time with an offset from UTC; le",
-            {"time_unit": "ms"},
-        ),
+        (at_times("10:00:00Z"), 1, "--time-unit ms is for times that are numbers…; leave it out", {"time_unit": "ms"}),
     ],
     "motive.csv": [
         (MOTIVE.splitlines()[0], 1, "the rows that say what the columns are end too early"),
@@ -158,19 +129,10 @@ WRONG: dict[str, list[tuple]] = {
             3,
             "6 columns where 8 are needed",
         ),
-        (
-            MOTIVE,
-            None,
-            "--time-unit means nothing to Motive CSV; leave it out, as its files say that themselves",
-            {"time_unit": "ms"},
-        ),
+        (MOTIVE, None, f"--time-unit means nothing to Motive CSV; {SAID_THERE}", {"time_unit": "ms"}),
     ],
     "vicon.csv": [
-        (
-            "Trajectories\n100\n,,a:b\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n",
-            None,
-            "no table of Objects or Segments in it",
-        ),
+        ("Trajectories\n100\n,,a:b\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n", None, "no table of Objects or Segments in"),
         ("Objects\nfast\n", 1, "no column has a known name (found Objects)"),
         ("Objects\n0\n,,A\nFrame,Sub Frame,RX,RY,RZ,RW,TX,TY,TZ\n", 2, "the rate is '0'; say it: --frame-rate 100"),
     ],
@@ -186,16 +148,8 @@ WRONG: dict[str, list[tuple]] = {
         (broken(position={"x": 1, "y": 2}), None, "pose 2 of 'left' has no number position.z"),
         (broken(timestamp=10**400), None, "pose 2 of 'left' has no number timestamp"),
         ('[{"t": 0, "position": [1, 2, 3]}]', None, "positions only, and rotations are needed (found "),
-        (
-            '[{"t": 0, "pos": [1, 2, 3], "quat": [1, 0, 0, 0]}, {"t": 1}]',
-            None,
-            "pose 1 of 'poses' has no number pos[0]",
-        ),
-        (
-            '{"frames": [{"file_path": "a.png", "transform_matrix": 1}]}',
-            None,
-            "this JSON holds no poses; it takes a list",
-        ),
+        ('[{"t": 0, "pos": [1, 2, 3], "quat": [1,0,0,0]}, {"t": 1}]', None, "pose 1 of 'poses' has no number pos[0]"),
+        ('{"frames": [{"file_path": "a.png", "transform_matrix": 1}]}', None, "this JSON holds no poses; it takes a l"),
     ],
     "poses.txt": [
         (str(RAW["KITTI"].text), None, "poses without times; say how many frames a second it has: --frame-rate 90"),
@@ -207,11 +161,7 @@ WRONG: dict[str, list[tuple]] = {
         (f"{TUM_COMMENTS}0 1 2 3 0 0 0 1 9\n", 4, "9 columns where 8 have a name"),
         ("0 1 2 3\n0.1 1 2 3\n", 1, "positions only, and rotations are needed; write t x y z qx qy qz qw"),
         (f"{TUM_ROWS}1,2,3\n", 3, "1 columns where 8 are needed"),
-        (
-            f"# {HEADER.replace(',', ' ')}\n{MIXED}",
-            1,
-            "40 of 48 samples jump from one place to another and back…; write a file for each",
-        ),
+        (f"# {HEADER}\n{MIXED}", 1, "40 of 48 samples jump from one place to another and back…; write a file for each"),
     ],
     "old.fbx": [
         (MAGIC + struct.pack("<I", 6100) + bytes(200), None, "this is FBX 6.1, and Blender imports 7.1 and later; exp"),
@@ -239,13 +189,8 @@ WRONG: dict[str, list[tuple]] = {
         ("HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n0\n", 6, "no joint has CHANNELS"),
         ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 50_000, 2, "more than 500 joints hang on one another; export a"),
         ("HIERARCHY\n" + "ROOT A {" + "JOINT B {}" * 50_000, 2, "more than 3000 joints; export fewer, such as one bod"),
-        (
-            ARM,
-            None,
-            "--columns means nothing to BVH; leave it out, as its files say that themselves",
-            {"columns": [("t", "t")]},
-        ),
-        (ARM, None, "--euler means nothing to BVH; leave it out, as its files say that themselves", {"euler": "XYZ"}),
+        (ARM, None, f"--columns means nothing to BVH; {SAID_THERE}", {"columns": [("t", "t")]}),
+        (ARM, None, f"--euler means nothing to BVH; {SAID_THERE}", {"euler": "XYZ"}),
     ],
 }
 """File names and contents; the line that is wrong; the beginning of the error, and after … its end; options."""

@@ -1,6 +1,7 @@
 """Tests of sources named by the user: files, bodies in them, and messages about the rest."""
 
 import os
+import re
 import socket
 import sys
 from pathlib import Path
@@ -21,18 +22,18 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("body", ["Drill", "*", "mixamorig:Hips", "", "C:\\x", "a/b"])
-def test_what_follows_the_file_and_a_colon_is_the_body(folder: Path, body: str) -> None:
+@pytest.mark.parametrize("body", [None, "Drill", "*", "mixamorig:Hips", "", "C:\\x", "a/b"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "take.csv",
+        pytest.param("take.csv:10:30.csv", marks=pytest.mark.skipif(sys.platform == "win32", reason="no such names")),
+    ],
+)
+def test_what_follows_the_file_and_a_colon_is_the_body(folder: Path, name: str, body: str | None) -> None:
     (folder / "take.csv").write_text(CSV)
-    assert split_source(f"take.csv:{body}") == (Path("take.csv"), body)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no colons in file names there")
-def test_a_file_with_a_colon_in_its_name_is_a_file(folder: Path) -> None:
-    (folder / "take.csv").write_text(CSV)
-    (folder / "take.csv:10:30.csv").write_text(CSV)
-    assert split_source("take.csv:10:30.csv") == (Path("take.csv:10:30.csv"), None)
-    assert split_source("take.csv:10:30.csv:Drill") == (Path("take.csv:10:30.csv"), "Drill")
+    (folder / name).write_text(CSV)
+    assert split_source(name if body is None else f"{name}:{body}") == (Path(name), body)
     assert split_source("take.csv:10") == (Path("take.csv"), "10")
 
 
@@ -48,21 +49,17 @@ def test_the_letter_of_a_windows_drive_is_no_file(folder: Path, name: str) -> No
     assert split_source(f"{name}:Drill") == (Path(name), "Drill")
 
 
-@pytest.mark.parametrize(
-    "source", ["gone.csv", "gone.csv:Drill", "", ":", ":Drill", "C:\\gone.csv", "a\0b.csv", "x" * 5000]
-)
-def test_a_missing_file_is_told(folder: Path, source: str) -> None:
-    with pytest.raises(TrajectoryError, match="no such file; check the path") as caught:
-        read_trajectories(source)
-    assert "\n" not in str(caught.value)
+MISSING = dict.fromkeys(["gone.csv", "gone.csv:Drill", "", ":", ":Drill", "C:\\gone.csv", "a\0b.csv", "x" * 5000], "")
+NEARLY = dict.fromkeys(["han.csv", "Hand.CVS", "{folder}/hand.cvs", "hnad.csv:left"], ": did you mean hand.csv?")
 
 
-@pytest.mark.parametrize("source", ["han.csv", "Hand.CVS", "{folder}/hand.cvs", "hnad.csv:left"])
-def test_a_file_that_is_nearly_there_is_named(folder: Path, source: str) -> None:
+@pytest.mark.parametrize(("source", "told"), (MISSING | NEARLY).items())
+def test_a_missing_file_is_told_with_the_one_that_is_nearly_it(folder: Path, source: str, told: str) -> None:
     (folder / "hand.csv").write_text(CSV)
     (folder / "hand.cvs.txt~").write_text(CSV)
-    with pytest.raises(TrajectoryError, match=r"no such file: did you mean hand\.csv\?; check the path"):
+    with pytest.raises(TrajectoryError, match=re.escape(f"no such file{told}; check the path")) as caught:
         read_trajectories(source.replace("{folder}", str(folder)))
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such files there")
