@@ -6,6 +6,7 @@ for. A failure names its case; RIGID_MOTION_FUZZ_FROM begins there.
 
 import os
 import re
+import sys
 import time
 from pathlib import Path
 from random import Random
@@ -72,6 +73,11 @@ def read_and_fill_in(source: str, number: int, options: ReadingOptions = AS_THE_
         elif len(clip.times) < 50:
             assert len(reduce_keys(clip.times, clip.poses, mode, tolerance=0.01)) >= 2
     return True
+
+
+def find_bpy_itself() -> None:
+    """Let a process that takes over the module path of one with Blender find the package bpy, and not a part of it."""
+    sys.path[:] = [folder for folder in sys.path if not Path(folder, "addon_utils.py").exists()]
 
 
 def assert_is_one_line(message: str, source: str) -> None:
