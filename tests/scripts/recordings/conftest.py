@@ -57,13 +57,6 @@ def scene() -> Iterator[object]:
 @pytest.fixture
 def saved(scene: object, tmp_path: Path) -> Callable[..., str]:
     """A function that saves the scene, clears it, and returns the path."""
-    bpy = pytest.importorskip("bpy")
-    from tests.blank import blank
+    from tests.scripts.recordings.skeletons import export
 
-    def _saved(name: str = "scene.blend") -> str:
-        path = str(tmp_path / name)
-        bpy.ops.wm.save_as_mainfile(filepath=path)
-        blank()
-        return path
-
-    return _saved
+    return lambda name="scene.blend": str(export(tmp_path / name))

@@ -96,7 +96,6 @@ def test_a_name_that_is_no_text_is_told(saved, refusal) -> None:
     drill = added("Drill")
     key(drill, 1, location=(0, 0, 0))
     key(drill, 9, location=(1, 0, 0))
-    bpy.context.preferences.filepaths.use_file_compression = False
     path = Path(saved())
     content = path.read_bytes()
     assert b"OBDrill\0" in content

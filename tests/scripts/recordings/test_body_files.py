@@ -9,7 +9,6 @@ import pytest
 from rigid_motion_batch.recordings import ReadingOptions, Trajectory, read_clips, read_trajectories
 from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import make_clip
-from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.inspecting import inspect
 from rigid_motion_batch.recordings.rest_bodies import (
     Skin,
@@ -128,35 +127,25 @@ def test_a_name_with_spaces_finds_its_joint_and_is_written_as_it_is(tmp_path: Pa
     np.testing.assert_allclose(again.poses.quaternions, clip.poses.quaternions, atol=1e-7)
 
 
-@pytest.fixture
-def clip() -> Clip:
-    """A clip with a skin of one triangle."""
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e38])
+def test_a_joint_that_is_nowhere_at_rest_has_no_bone_and_is_told(number: float) -> None:
     clip = swinging_body()
     skin = Skin(np.eye(3), np.array([[0, 1, 2]]), np.zeros((3, 4), dtype=int), np.eye(4)[[0, 0, 0]])
-    return replace(clip, rest_body=replace(clip.rest_body, skin=skin))
-
-
-@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e38])
-def test_a_joint_that_is_nowhere_at_rest_has_no_bone_and_is_told(clip: Clip, number: float) -> None:
-    rest_body = clip.rest_body
-    rest_body.tails[2, 1] = number
-    rest_body.rest.positions[5, 0] = number
-    rest_body.skin.vertices[1, 1] = number
-    rest_body = replace(rest_body, ends=np.full(len(JOINTS), 0.1))
-    sound, done = repaired(rest_body)
-    assert sound.ends.tolist() == [0.0 if joint in (2, 5) else 0.1 for joint in range(len(JOINTS))]
+    damaged = replace(clip.rest_body, skin=skin, ends=np.full(len(JOINTS), 0.1))
+    damaged.tails[2, 1] = damaged.rest.positions[5, 0] = damaged.skin.vertices[1, 1] = number
+    sound, done = repaired(damaged)
+    nowhere = np.isin(np.arange(len(JOINTS)), (2, 5))
+    np.testing.assert_array_equal(sound.ends, np.where(nowhere, 0.0, 0.1))
+    np.testing.assert_array_equal(sound.tails, np.where(nowhere[:, None], 0.0, damaged.tails))
+    np.testing.assert_array_equal(sound.rest.positions, np.where(nowhere[:, None], 0.0, damaged.rest.positions))
+    assert sound.skin is None
     assert done == (
         "drew no bones for joints that are nowhere at rest (2: Head, Glove)",
         "left out a skin with numbers that are missing, not finite or too large",
     )
-    assert sound.skin is None
-    for joint in range(len(JOINTS)):
-        for result, before in ((sound.tails, rest_body.tails), (sound.rest.positions, rest_body.rest.positions)):
-            assert np.array_equal(result[joint], [0, 0, 0] if joint in (2, 5) else before[joint])
-    trajectory = Trajectory("walk", clip.times, clip.poses, rest_body=rest_body)
-    made = make_clip(trajectory, "walk.fbx", "walk", "blender")
+    made = make_clip(Trajectory("walk", clip.times, clip.poses, rest_body=damaged), "walk.fbx", "walk", "blender")
     assert made.repairs == done
-    assert np.isfinite(made.rest_body.tails).all()
+    np.testing.assert_array_equal(made.rest_body.tails, sound.tails)
 
 
 def test_the_size_of_a_body_is_that_from_where_it_branches() -> None:

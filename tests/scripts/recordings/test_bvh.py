@@ -84,28 +84,28 @@ def test_more_or_fewer_rows_than_the_file_says_are_read_with_a_warning(write, co
     assert (len(shoulder.warnings), len(elbow.warnings)) == (1, 0)
 
 
+SURE = "guessed from the size alone, the only usual unit that makes a grown-up of it"
+
+
 @pytest.mark.parametrize(
-    ("size", "unit", "metres", "told"),
+    ("size", "metres", "remark", "doubted"),
     [
-        (1.7, "", 1.7, ""),
-        (170.0, "centimetres", 1.7, "the only usual unit that makes a grown-up of it"),
-        (7.0, "feet", 2.13, "the only usual unit that makes a grown-up of it"),
-        (17.0, "units of CMU's motion capture", 0.96, "may as well be decimetres (1.7 m)"),
-        (0.1, "", 0.1, ""),
+        (1.7, 1.7, "", False),
+        (170.0, 1.7, f"centimetres: 1.7 m, {SURE}", False),
+        (7.0, 2.13, f"feet: 2.13 m, {SURE}", False),
+        (17.0, 0.96, "units of CMU's motion capture", False),
+        (17.0, 0.96, "may as well be decimetres (1.7 m)", False),
+        (0.1, 0.1, "", True),
     ],
 )
-def test_a_guessed_unit_is_told_with_how_sure_it_is(write, size: float, unit: str, metres: float, told: str) -> None:
+def test_a_guessed_unit_is_told_with_how_sure_it_is(write, size: float, metres: float, remark: str, doubted: bool):
     text = ARM.replace("2.0 0.0 0.0", f"{size} 0.0 0.0")
     (body,) = read_trajectories(path := write("arm.bvh", text)).trajectories
-    result = size * body.metres_per_unit
-    assert unit in body.remark
-    assert told in body.remark
-    doubted = "; if not, say how long it is: --scale METRES" in " ".join(map(str, body.warnings))
-    assert doubted == (not 0.5 <= result <= 2.5)
-    if doubted:
-        assert f"it is {result:.3g} m large" in body.warnings[-1].text
-    if size > 1.0:
-        assert result == pytest.approx(metres, abs=5e-3)
+    assert size * body.metres_per_unit == pytest.approx(metres, abs=5e-3)
+    assert remark in body.remark
+    warned = " ".join(map(str, body.warnings))
+    assert (f"it is {metres:.3g} m large" in warned) == doubted
+    assert ("; if not, say how long it is: --scale METRES" in warned) == doubted
     (scaled,) = read_trajectories(path, ReadingOptions(scale=0.5)).trajectories
     assert (scaled.metres_per_unit, scaled.remark, scaled.warnings) == (0.5, "", ())
 
