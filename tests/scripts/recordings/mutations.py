@@ -54,11 +54,6 @@ def in_place(content: bytes, chance: Random) -> bytes:
     return content
 
 
-def _span(content: bytes, chance: Random, longest: int = 40) -> tuple[int, int]:
-    first = chance.randint(0, len(content))
-    return first, min(len(content), first + chance.randint(1, longest))
-
-
 def change_bytes(content: bytes, chance: Random) -> bytes:
     changed = bytearray(content)
     for _ in range(chance.choice((1, 2, 10)) if changed else 0):
@@ -67,8 +62,9 @@ def change_bytes(content: bytes, chance: Random) -> bytes:
 
 
 def repeat_piece(content: bytes, chance: Random) -> bytes:
-    first, last = _span(content, chance)
-    return content[:last] + content[first:last] * chance.choice((1, 2, 200)) + content[last:]
+    first = chance.randint(0, len(content))
+    piece = content[first : first + chance.randint(1, 40)]
+    return content[:first] + piece * chance.choice((2, 3, 201)) + content[first + len(piece) :]
 
 
 def truncate(content: bytes, chance: Random) -> bytes:

@@ -54,7 +54,7 @@ def test_what_is_open_stays_as_it_is(saved) -> None:
 
 
 @pytest.mark.parametrize("allowed", [False, True])
-def test_no_script_of_the_file_is_run(saved, tmp_path: Path, allowed: bool) -> None:
+def test_no_script_of_the_file_is_run(saved, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, allowed: bool) -> None:
     trace = tmp_path / "trace"
     driver = added("Driven").driver_add("location", 0).driver
     driver.expression = f"len(__import__('pathlib').Path({str(trace)!r}).write_text('run') * [0]) + 1"
@@ -64,13 +64,9 @@ def test_no_script_of_the_file_is_run(saved, tmp_path: Path, allowed: bool) -> N
     path = saved()
     trace.unlink(missing_ok=True)
     preferences = bpy.context.preferences.filepaths
-    before = preferences.use_scripts_auto_execute
-    preferences.use_scripts_auto_execute = allowed
-    try:
-        read_trajectories(path + ":Driven")
-        assert preferences.use_scripts_auto_execute == allowed
-    finally:
-        preferences.use_scripts_auto_execute = before
+    monkeypatch.setattr(preferences, "use_scripts_auto_execute", allowed)
+    read_trajectories(path + ":Driven")
+    assert preferences.use_scripts_auto_execute == allowed
     assert not trace.exists()
 
 

@@ -33,10 +33,7 @@ def test_a_command_line_says_all_of_them_and_they_are_the_same_after_a_journey_a
         (["--time-unit", "min"], "invalid choice: 'min'"),
         (["--scale", "0"], "a unit cannot be 0.0 metres long; give a number such as 0.01 for centimetres"),
         (["--scale", "cm"], "a unit cannot be nan metres long"),
-        (
-            ["--euler", "XYX"],
-            "'XYX' is not an order of Euler angles; give the three axes once each, in capitals (YXZ) for",
-        ),
+        (["--euler", "XYX"], "'XYX' is not an order of Euler angles; give the three axes once each, in capitals (YXZ)"),
         (["--frame-rate", "0"], "there cannot be 0.0 frames a second; give a number such as 90"),
         (["--start", "-1"], "--start cannot be -1.0: give seconds after the first sample, such as 2.5"),
         (["--end", "0"], "--end 0 leaves nothing: it must be later than --start 0"),

@@ -70,13 +70,10 @@ def test_what_is_no_file_is_told_and_never_opened(folder: Path, body: str) -> No
         listening.bind("socket.csv")
         Path("circle.csv").symlink_to("circle.csv")
         Path("dangling.csv").symlink_to("gone.csv")
-        told = {
-            "pipe.csv": "this is a pipe or a device, not a file; write what comes out of it to a file, and name that",
-            "socket.csv": "this is a pipe or a device, not a file; write what comes out of it",
-            "/dev/zero": "this is a pipe or a device, not a file; write what comes out of it",
-            "circle.csv": "this is a symbolic link to 'circle.csv', where nothing is; name the file itself",
-            "dangling.csv": "this is a symbolic link to 'gone.csv', where nothing is; name the file itself",
-        }
+        no_file = "this is a pipe or a device, not a file; write what comes out of it to a file, and name that"
+        told = dict.fromkeys(("pipe.csv", "socket.csv", "/dev/zero"), no_file)
+        for path, gone in (("circle.csv", "circle.csv"), ("dangling.csv", "gone.csv")):
+            told[path] = f"this is a symbolic link to '{gone}', where nothing is; name the file itself"
         for path, problem in told.items():
             with pytest.raises(TrajectoryError, match=f"^{path}: {problem}"):
                 read_trajectories(f"{path}{body}")
