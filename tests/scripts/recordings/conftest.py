@@ -57,6 +57,6 @@ def scene() -> Iterator[object]:
 @pytest.fixture
 def saved(scene: object, tmp_path: Path) -> Callable[..., str]:
     """A function that saves the scene, clears it, and returns the path."""
-    from tests.scripts.recordings.skeletons import export
+    from tests.scripts.recordings.blends import export
 
     return lambda name="scene.blend": str(export(tmp_path / name))

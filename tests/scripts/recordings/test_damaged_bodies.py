@@ -13,8 +13,8 @@ from random import Random
 import pytest
 
 from tests.blank import blank
+from tests.scripts.recordings.blends import body, export, skinned
 from tests.scripts.recordings.mutations import in_place, mutated
-from tests.scripts.recordings.skeletons import body, export, skinned
 from tests.scripts.recordings.test_fuzz import BONE, FIRST, PATIENCE, find_bpy_itself, read_and_fill_in
 from tests.thoroughness import THOROUGH
 

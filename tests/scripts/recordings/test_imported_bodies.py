@@ -19,20 +19,23 @@ from rigid_motion_batch.recordings.fbx import FIRST_RECORD_BYTE
 from rigid_motion_batch.scenes.armature import RestFigure
 from rigid_motion_batch.scenes.physique import body_size
 from rigid_motion_batch.silencing import silenced
-from tests.scripts.recordings.blends import added, key, on_frames, rig
-from tests.scripts.recordings.glbs import curved, soldier
-from tests.scripts.recordings.skeletons import (
+from tests.scripts.recordings.blends import (
     BONES,
     CARRYING,
     FRAMES,
     TRIANGLES,
+    added,
     animate,
     body,
     export,
+    key,
+    on_frames,
     places_in_blender,
+    rig,
     skinned,
     surface_in_blender,
 )
+from tests.scripts.recordings.glbs import curved, soldier
 
 bpy = pytest.importorskip("bpy")
 image_utils = pytest.importorskip("bpy_extras.image_utils")
@@ -81,9 +84,9 @@ def test_joints_are_where_blender_showed_them_before_the_export(exported, ending
     assert walk.poses.scales is None
     np.testing.assert_allclose(walk.times, np.arange(len(FRAMES)) / fps, rtol=1e-12)
     np.testing.assert_allclose(places(walk), seen, atol=SINGLE)
-    parents = {name: walk.rest_body.parents[number] for number, name in enumerate(walk.rest_body.joints)}
-    for name, (_, _, parent) in BONES.items():
-        assert parents[name] == (walk.rest_body.joints.index(parent) if parent else -1)
+    names = *walk.rest_body.joints, None
+    for name, parent in zip(names, walk.rest_body.parents, strict=False):
+        assert names[parent] == BONES[name][2]
     assert (np.einsum("jni,jni->jn", walk.poses.quaternions[:, 1:], walk.poses.quaternions[:, :-1]) > 0.0).all()
 
 
@@ -209,12 +212,9 @@ def test_too_much_is_refused(exported, refusal, monkeypatch: pytest.MonkeyPatch)
 def test_an_fbx_that_claims_more_than_it_holds_is_refused_before_room_is_made_for_it(exported, refusal) -> None:
     path, _ = exported(".fbx")
     content = path.read_bytes()
-    end, _, length, name = struct.unpack_from("<IIIB", content, FIRST_RECORD_BYTE)
-    path.write_bytes(
-        content[:FIRST_RECORD_BYTE]
-        + struct.pack("<IIIB", end, 2**32 - 1, length, name)
-        + content[FIRST_RECORD_BYTE + 13 :]
-    )
+    damaged = bytearray(content)
+    struct.pack_into("<I", damaged, FIRST_RECORD_BYTE + 4, 2**32 - 1)
+    path.write_bytes(damaged)
     assert refusal(str(path))[1].startswith("this FBX is damaged (a part of it is longer than the whole); ")
 
     def record(packed: bytes, expected: int) -> bytes:

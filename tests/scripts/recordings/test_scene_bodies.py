@@ -17,9 +17,8 @@ from rigid_motion_batch.recordings.scene_bodies import jointed, parents_among
 from rigid_motion_batch.silencing import silenced
 from tests.blank import blank
 from tests.gltf.making import Making
-from tests.scripts.recordings.blends import FPS, added, in_blender, key, on_frames
+from tests.scripts.recordings.blends import FPS, added, export, in_blender, key, on_frames
 from tests.scripts.recordings.glbs import turning
-from tests.scripts.recordings.skeletons import export
 
 bpy = pytest.importorskip("bpy")
 
