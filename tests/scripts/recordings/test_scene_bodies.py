@@ -1,6 +1,5 @@
 """Tests of bodies in scene files (props, cameras, node hierarchies without a skin) against Blender's own import."""
 
-import itertools
 import shutil
 import sys
 from collections.abc import Sequence
@@ -13,7 +12,7 @@ from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import angle_between
 from rigid_motion_batch.recordings import Trajectory, read_trajectories
 from rigid_motion_batch.recordings.inspecting import inspect
-from rigid_motion_batch.recordings.scene_bodies import jointed, parents_among
+from rigid_motion_batch.recordings.scene_bodies import jointed
 from rigid_motion_batch.silencing import silenced
 from tests.blank import blank
 from tests.gltf.making import Making
@@ -241,16 +240,6 @@ def test_few_nodes_or_flat_ones_are_no_body(count: int, generations: int, is_bod
     parents = np.array([*range(-1, generations - 1), *[0] * (count - generations)])
     every = np.ones(count, dtype=bool)
     assert jointed(parents, every, every) == ([[*range(count)]] if is_body else [])
-
-
-def test_nodes_in_any_order_hang_on_the_nearest_that_counts() -> None:
-    parents = np.array([2, 0, -1, 1])
-    assert parents_among(parents, [2, 1, 3]).tolist() == [-1, 0, 1]
-    for order in itertools.permutations(range(4)):
-        own = [node for node in order if node != 0]
-        places = {node: place for place, node in enumerate(own)}
-        above = {2: -1, 1: places[2], 3: places[1]}
-        assert parents_among(parents, own).tolist() == [above[node] for node in own]
 
 
 def test_nodes_have_names_of_their_own_and_what_is_named_and_not_there_is_told(
