@@ -24,7 +24,6 @@ from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS
 from tests.scripts.bvh_bodies import TIMES, bvh_text
 from tests.scripts.recordings.layouts import LAYOUTS
 from tests.scripts.recordings.mutations import mutated
-from tests.scripts.recordings.optical_layouts import OPTICAL
 from tests.thoroughness import tried
 
 CASES = int(os.environ.get("RIGID_MOTION_FUZZ", tried(400)))
@@ -112,7 +111,7 @@ def test_a_damaged_bvh_is_refused_in_one_line_or_can_be_filled_in(tmp_path: Path
 
 
 @pytest.mark.any_blender
-@pytest.mark.parametrize("name", [*LAYOUTS, *OPTICAL])
+@pytest.mark.parametrize("name", LAYOUTS)
 def test_damage_to_any_layout_is_refused_in_one_line_or_can_be_filled_in(tmp_path: Path, name: str) -> None:
-    layout = (LAYOUTS | OPTICAL)[name]
+    layout = LAYOUTS[name]
     fuzz(tmp_path, f".{layout.name}", layout.text.encode(), CASES // 10, ReadingOptions(**layout.said))

@@ -18,10 +18,9 @@ from rigid_motion_batch.recordings.inspecting import inspect
 from rigid_motion_batch.recordings.rewriting import eulers_near
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.recordings.layouts import LAYOUTS, LEFT, RIGHT, assert_is_the_motion
-from tests.scripts.recordings.optical_layouts import OPTICAL
 from tests.scripts.recordings.written_layouts import WRITTEN
 
-EVERY = LAYOUTS | OPTICAL | WRITTEN
+EVERY = LAYOUTS | WRITTEN
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -84,7 +83,7 @@ def test_cameras_look_along_y_of_the_object_with_z_above(write, name: str) -> No
 
 
 def test_of_motive_bones_are_taken_by_name_and_poses_in_the_space_of_a_parent_are_told(write) -> None:
-    both = str(OPTICAL["Motive"].text).replace("Meters\n", "Meters,Coordinate Space,Local\n").splitlines()
+    both = str(LAYOUTS["Motive"].text).replace("Meters\n", "Meters,Coordinate Space,Local\n").splitlines()
     for row, name in {2: "Bone", 3: "Hip", 4: "7", 5: None, 6: None}.items():
         cells = both[row].split(",")
         both[row] += "," + ",".join(cells[2:9] if name is None else [name] * 7)

@@ -13,12 +13,11 @@ import pytest
 from rigid_motion_batch.recordings import TrajectoryError, bvh, read_trajectories, recordings, tables
 from rigid_motion_batch.recordings.fbx import MAGIC
 from tests.scripts.bvh_bodies import TIMES, bvh_text
-from tests.scripts.recordings.layouts import BOTH, OTHERS, POSE, RAW, SECONDS, csv, names, rows
-from tests.scripts.recordings.optical_layouts import OPTICAL
+from tests.scripts.recordings.layouts import BOTH, LAYOUTS, POSE, SECONDS, csv, names, rows
 from tests.scripts.recordings.test_bvh import ARM
 from tests.scripts.recordings.written_layouts import HEADER, by_turns
 
-MOTIVE = str(OPTICAL["Motive"].text)
+MOTIVE = str(LAYOUTS["Motive"].text)
 ROWS = "0.0,1,2,3,0.1,0.2,0.3,0.9\n0.1,4,5,6,0.4,0.5,0.6,0.4\n"
 TUM_COMMENTS = "# ground truth trajectory\n# file: 'dataset.bag'\n# timestamp tx ty tz qx qy qz qw\n"
 TUM_ROWS = "1305031098.6659 1.3 0.6 1.6 0.6132 0.5962 -0.3311 -0.3986\n1305031098.6758 1.4 0.7 1.7 0.1 0.2 0.3 0.4\n"
@@ -28,7 +27,7 @@ MIXED = by_turns(rows(SECONDS, *POSE), rows(SECONDS, *BOTH[2:]))
 
 def broken(**changes: object) -> str:
     """Return an A-Frame recording with changes to the third pose of the first device."""
-    content = json.loads(OTHERS["A-Frame"].text)
+    content = json.loads(LAYOUTS["A-Frame"].text)
     content["left"]["poses"][2].update(changes)
     return json.dumps(content)
 
@@ -158,7 +157,7 @@ WRONG: dict[str, list[tuple]] = {
         ('{"frames": [{"file_path": "a.png", "transform_matrix": 1}]}', None, "this JSON holds no poses; it takes a l"),
     ],
     "poses.txt": [
-        (str(RAW["KITTI"].text), None, "poses without times; say how many frames a second it has: --frame-rate 90"),
+        (str(LAYOUTS["KITTI"].text), None, "poses without times; say how many frames a second it has: --frame-rate 90"),
         ("#   POINTS2D[] as (X, Y)\n", None, "no column of time, only one that counts frames"),
     ],
     "walk.tum": [
@@ -262,8 +261,8 @@ BOMBS: dict[str, str] = {
     + motion(SIZE // 4, "0\n" * (SIZE // 4)),
     "one long row.bvh": ROOT + "}\n" + motion(1, of("0 ")),
     "sound.csv": CSV + rows(SECONDS, *POSE, separator=",") * 100,
-    "sound.tum": str(RAW["TUM"].text) * 100,
-    "sound.json": json.dumps({"poses": 100 * json.loads(OTHERS["A-Frame of 2017"].text)}),
+    "sound.tum": str(LAYOUTS["TUM"].text) * 100,
+    "sound.json": json.dumps({"poses": 100 * json.loads(LAYOUTS["A-Frame of 2017"].text)}),
     "sound.bvh": bvh_text(np.arange(600) / 30.0),
 }
 """Contents of files by name; some are sound recordings."""
@@ -292,7 +291,7 @@ def test_what_a_file_takes_is_bounded_by_what_it_holds(tmp_path: Path, name: str
     ("module", "limit", "lowered", "name", "text", "line", "told"),
     [
         (tables, "LARGEST_FILE", 10, "take.csv", CSV, None, "the file has 0 MiB, and 0 can be read; split"),
-        (tables, "MOST_ROWS", 5, "take.tum", str(RAW["TUM"].text), 24, "more than 5 rows; split the recording"),
+        (tables, "MOST_ROWS", 5, "take.tum", str(LAYOUTS["TUM"].text), 24, "more than 5 rows; split the recording"),
         (tables, "LONGEST_LINE", 50, "take.csv", CSV + "1" * 60, 2, "this line is longer than 50 characters; name a"),
         (tables, "MOST_COLUMNS", 5, "take.csv", CSV, 1, "more than 5 columns; export fewer bodies"),
         (bvh, "MOST_JOINTS", 1, "take.bvh", bvh_text(TIMES[:8]), 8, "more than 1 joints; export fewer, such as one"),

@@ -10,11 +10,11 @@ from tests.scripts.recordings.layouts import (
     COUNT,
     COUNTED,
     FIRST_W,
+    LAYOUTS,
     LEFT,
     MICROSECONDS,
     NANOSECONDS,
     NUMBERS,
-    OTHERS,
     POSE,
     SECONDS,
     Layout,
@@ -80,7 +80,7 @@ ENCODED: dict[str, Layout] = {
         f"{HEADER}\n" + each_cell(rows(SECONDS, *POSE, separator=","), lambda cell: f"{float(cell):+.17E}")
     ),
     "TUM in UTF-8 with a mark": Layout(b"\xef\xbb\xbf" + TUM.encode(), "take.tum"),
-    "g2o backwards": Layout(reversed_lines(str(OTHERS["g2o"].text)), "take.txt", COUNTED),
+    "g2o backwards": Layout(reversed_lines(str(LAYOUTS["g2o"].text)), "take.txt", COUNTED),
 }
 
 
