@@ -8,25 +8,24 @@ import pytest
 from rigid_motion_batch.cli.inspect import main
 from rigid_motion_batch.recordings import ReadingOptions
 from rigid_motion_batch.recordings.inspecting import inspect
+from tests.scripts.recordings.layouts import csv
+
+HEADER = "t,x,y,z,qx,qy,qz,qw"
 
 
-def log(rows: int = 300, rate: float = 90.0, scale: float = 1.0, up: int = 1, header: str = "t,x,y,z") -> str:
+def log(rows: int = 300, scale: float = 1.0, up: int = 1, header: str = HEADER) -> str:
     """Return a CSV log of a hand that swings 1 m above the floor, and turns about x by 90 degrees per second."""
-    times = np.arange(rows) / rate
-    places = np.roll(
-        np.stack((0.2 * np.cos(3 * times), 1.0 + 0.3 * np.sin(2 * times), 0.3 * np.sin(3 * times))), up - 1, 0
-    )
-    half = np.pi / 4.0 * times
-    columns = np.column_stack([times, *(scale * places), np.sin(half), 0.0 * half, 0.0 * half, np.cos(half)])
-    return f"{header},qx,qy,qz,qw\n" + "".join(",".join(map(repr, row)) + "\n" for row in columns.tolist())
+    times = np.arange(rows) / 90.0
+    places = 0.2 * np.cos(3 * times), 1.0 + 0.3 * np.sin(2 * times), 0.3 * np.sin(3 * times)
+    half, still = np.pi / 4.0 * times, 0.0 * times
+    return csv(header, times, scale * np.roll(places, up - 1, axis=0).T, np.sin(half), still, still, np.cos(half))
 
 
 def test_what_jitters_is_measured_and_spikes_are_named(write, capsys) -> None:
-    header, *rows = log().splitlines()
-    numbers = np.array([row.split(",") for row in rows], dtype=float)
+    numbers = np.loadtxt(log().splitlines()[1:], delimiter=",")
     numbers[:, 1:4] += np.random.default_rng(1).normal(size=(300, 3)) * 0.0004
     numbers[90, 1] += 0.05
-    source = write("hand.csv", "\n".join([header, *(",".join(map(repr, row)) for row in numbers.tolist())]))
+    source = write("hand.csv", csv(HEADER, numbers))
     found = inspect(source).contents[0].jitter
     assert found.position == pytest.approx(0.0004, rel=0.15)
     assert found.rotation == 0.0
@@ -38,10 +37,10 @@ def test_what_jitters_is_measured_and_spikes_are_named(write, capsys) -> None:
 @pytest.mark.parametrize(
     ("header", "scale", "options", "metres", "name", "known_from"),
     [
-        ("t,x,y,z", 1.0, {}, 1.0, "metres", "assumed, where the file says nothing else"),
-        ("t,x_cm,y_cm,z_cm", 100.0, {}, 0.01, "centimetres", "as the file says"),
-        ("t,x,y,z", 39.37, {"scale": 0.0254}, 0.0254, "inches", "as --scale says"),
-        ("t,x_mm,y_mm,z_mm", 2.0, {"scale": 0.5}, 0.5, "units of 0.5 m", "as --scale says"),
+        (HEADER, 1.0, {}, 1.0, "metres", "assumed, where the file says nothing else"),
+        ("t,x_cm,y_cm,z_cm,qx,qy,qz,qw", 100.0, {}, 0.01, "centimetres", "as the file says"),
+        (HEADER, 39.37, {"scale": 0.0254}, 0.0254, "inches", "as --scale says"),
+        ("t,x_mm,y_mm,z_mm,qx,qy,qz,qw", 2.0, {"scale": 0.5}, 0.5, "units of 0.5 m", "as --scale says"),
     ],
 )
 def test_the_unit_comes_with_where_it_is_from(write, header, scale, options, metres, name, known_from) -> None:

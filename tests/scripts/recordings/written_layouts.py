@@ -156,6 +156,7 @@ MEANT: dict[str, Layout] = {
         csv("t,x,y,z,rx_rad,ry_rad,rz_rad", SECONDS, LEFT.positions, angles("XYZ", False) + 58.0 * np.pi),
         said={"euler": "XYZ"},
     ),
+    "keys of rows": Layout(csv(HEADER, NUMBERS + 18295873486192640, *POSE), said=COUNTED),
     "frames and their rate": Layout(csv("frame,x,y,z,qx,qy,qz,qw", NUMBERS + 100, *POSE), said=COUNTED),
     "roll, pitch and yaw": Layout(
         csv("t,x,y,z,roll_deg,pitch_deg,yaw_deg", SECONDS, LEFT.positions, angles("xyz", True)),
