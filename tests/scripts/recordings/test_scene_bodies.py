@@ -25,6 +25,9 @@ FRAMES = range(1, 21)
 
 TIMES = np.arange(31) / 30
 
+FIGURE = {"Hips": "Place", "Spine": "Hips", "Head": "Spine", "Arm": "Spine", "Leg": "Hips", "Foot": "Leg"}
+"""Parents of nodes that are a body."""
+
 ENDINGS = (".glb", ".gltf", ".vrma", ".fbx")
 
 SINGLE = 3e-6
@@ -58,9 +61,8 @@ def stage(path: Path) -> Path:
 
 def figure(path: Path) -> Path:
     """Write a file with a body of six nodes without a skin, below a node at rest, and a prop."""
-    parents = {"Hips": "Place", "Spine": "Hips", "Head": "Spine", "Arm": "Spine", "Leg": "Hips", "Foot": "Leg"}
     nodes = {"Place": added("Place", location=(0, 3, 0))}
-    for number, (name, parent) in enumerate(parents.items()):
+    for number, (name, parent) in enumerate(FIGURE.items()):
         nodes[name] = added(name, parent=nodes[parent], rotation_mode="QUATERNION", location=(0.1, 0, 0.3))
         for frame in FRAMES:
             half = 0.03 * frame * (-1) ** number
@@ -137,23 +139,20 @@ def test_what_moves_alone_is_a_rigid_body_where_blender_imports_it(scene, tmp_pa
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_nodes_that_hang_on_one_another_are_a_body(scene, tmp_path: Path, ending: str) -> None:
     path = figure(tmp_path / f"figure{ending}")
-    names = ("Hips", "Spine", "Head", "Arm", "Leg", "Foot")
-    expected = imported(path, names)
+    expected = imported(path, [*FIGURE])
     recording = read_trajectories(str(path))
     (whole,) = recording.trajectories
     assert "took Place of 2 bodies; others: Cup" in recording.note
-    assert (whole.name, {*whole.rest_body.joints}) == ("figure", {*names})
+    assert whole.name == "figure"
     joints = whole.rest_body.joints
-    parents = [joints[parent] if parent >= 0 else "" for parent in whole.rest_body.parents]
-    assert dict(zip(joints, parents, strict=True)) == dict(
-        zip(names, ("", "Hips", "Spine", "Spine", "Hips", "Leg"), strict=True)
-    )
+    parents = [joints[parent] if parent >= 0 else "Place" for parent in whole.rest_body.parents]
+    assert dict(zip(joints, parents, strict=True)) == FIGURE
     world = whole.rest_body.skeleton.in_root_space(on_frames(whole).poses)
-    for name in names:
+    for name in FIGURE:
         np.testing.assert_allclose(world[joints.index(name)].positions, expected[name].positions, atol=SINGLE)
     (hand,) = read_trajectories(f"{path}:Place/Arm").trajectories
     np.testing.assert_allclose(on_frames(hand).poses.positions, expected["Arm"].positions, atol=SINGLE)
-    assert len(read_trajectories(f"{path}:*").trajectories) == len(names) + 1
+    assert len(read_trajectories(f"{path}:*").trajectories) == len(FIGURE) + 1
 
 
 @pytest.mark.parametrize("ending", [".glb", ".fbx"])
