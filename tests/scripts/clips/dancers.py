@@ -36,8 +36,7 @@ def dancing_clip(
     waves[list(still)] = 0.3
     turns = normalise(np.concatenate((np.ones((count, 1, len(times))), waves), axis=1).transpose(0, 2, 1))
     places = np.repeat(np.array(OFFSETS, dtype=float)[:, None], len(times), axis=1)
-    if 0 not in still:
-        places[0] += np.stack((walked * times / 1.2, 0.1 * np.sin(3.0 * times), 0.05 * np.sin(7.0 * times)), axis=-1)
+    places[0] += np.stack((walked * times / 1.2, 0.1 * np.sin(3.0 * times), 0.05 * np.sin(7.0 * times)), axis=-1)
     scale = 1.0 / metres_per_unit
     local = Poses(np.array(OFFSETS, dtype=float) * scale, at_rest)
     rest_body = rest_body_of(JOINTS, np.array(PARENTS), local, np.array(TAILS, dtype=float) * scale)

@@ -9,6 +9,7 @@ import numpy as np
 
 from tests.gltf.making import Making
 from tests.gltf.player import File
+from tests.scripts.clips.bodies import BONES, PARENTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,14 +84,8 @@ def mixed_rates(seconds: float = 2.0) -> Body:
 
 
 def soldier(size: float = 0.01) -> Body:
-    """Return a body of 1.8 m in its own unit below a node that scales it, as in exports of Mixamo."""
-    parents = [-1, 0, 1, 2, 3, 2, 5, 0, 7, 0, 9]
-    offsets = np.array(
-        [
-            *((0, 95, 0), (0, 25, 0), (0, 25, 0), (0, 15, 0), (0, 18, 0), (50, 0, 0), (25, 0, 0)),
-            *((10, -5, 0), (0, -85, 5), (-10, -5, 0), (0, -85, 5)),
-        ]
-    )
+    """Return a body of 1.5 m in its own unit below a node that scales it, as in exports of Mixamo."""
+    parents, offsets = PARENTS.tolist(), np.array([offset for _, offset in BONES.values()])
     times = np.arange(31) / 30
     tracks = [
         Track(joint, "rotation", times, turning(times, 0.3 * np.sin(3 * times + joint), (1, 0, 0)))

@@ -50,6 +50,7 @@ def of_gltf(**content: object) -> str:
 
 NESTED = [*({"children": [node + 1]} for node in range(5000)), {}]
 VRM = {"VRMC_vrm_animation": {"humanoid": {"humanBones": {"hips": {"node": 0}}}}}
+TURNED = "t,x,y,z,rx,ry,rz\n0,0,0,0,359,0,0\n.1,0,0,0,1,0,0\n"
 CLOCKS = csv("time,clock," + HEADER[2:], 2.0 * SECONDS, SECONDS, *POSE)
 MANY = csv(f"id,{HEADER}", np.arange(1200), np.arange(1200) / 10.0, *np.eye(7)[[6] * 1200].T)
 OF_DEVICES = {"columns": [("device", "id"), ("t", "t")]}
@@ -90,12 +91,7 @@ WRONG: dict[str, list[tuple]] = {
         (zeros(HEADER), 1, "no column is named 'when'; --columns t=NAME takes one", {"columns": [("t", "when")]}),
         (zeros("t [min],x,y,z,qx,qy,qz,qw"), 1, "'min' is not a known unit of time; --time-unit s, ms, us, ns"),
         (zeros("t,x [furlong],y,z,qx,qy,qz,qw"), 1, "'furlong' is not a known unit of length; say how many metres it"),
-        (
-            "t,x,y,z,rx,ry,rz\n0,0,0,0,359,0,0\n.1,0,0,0,1,0,0\n",
-            1,
-            "angles go up to 359, which are not radians; say so: --degrees;",
-            {"euler": "XYZ"},
-        ),
+        (TURNED, 1, "angles go up to 359, which are not radians; say so: --degrees;", {"euler": "XYZ"}),
         (CLOCKS, 1, "two columns mean t and disagree ('time' lasts…say which with --columns t=NAME"),
         (MANY, 1, "more than 1000 different values in the column of devices; name another with --columns", OF_DEVICES),
         (
@@ -129,11 +125,7 @@ WRONG: dict[str, list[tuple]] = {
         (MOTIVE + "3,0.025" + ",1" * 99 + "\n", 32, "101 columns where 10 have a name"),
         (MOTIVE.replace(",Tool", ',"Tool', 1).replace("Tool", "x" * 200_000, 1), 4, "this line is not a header"),
         (MOTIVE.replace("Rigid Body", "").replace("Marker", ""), 7, "no rigid body in this take"),
-        (
-            "Time,Position,Rotation\n0,(0, 0, 0),(0, 0, 0, 1)\n.1,(0, 0),(0, 0, 0, 1)\n",
-            3,
-            "6 columns where 8 are needed",
-        ),
+        ("t,Position,Rotation\n0,(0, 0, 0),(0, 0, 0, 1)\n.1,(0, 0),(0, 0, 0, 1)\n", 3, "6 columns where 8 are needed"),
         (MOTIVE, None, f"--time-unit means nothing to Motive CSV; {SAID_THERE}", {"time_unit": "ms"}),
     ],
     "vicon.csv": [

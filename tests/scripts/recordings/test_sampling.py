@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_motion.motion import Poses, interpolate
+from rigid_motion.motion import interpolate
 from rigid_motion_batch.recordings import Trajectory, read_trajectories
 from tests.scripts.recordings.blends import FPS, added, fcurves, in_blender, key, linear
 from tests.scripts.recordings.glbs import Body, Track, chain, curved, mixed_rates, turning
@@ -24,16 +24,12 @@ def read(source: object) -> Trajectory:
     return trajectory
 
 
-def at(trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
-    """Return joint positions with linear in-betweens in the parents' spaces, shape (joints, times, 3)."""
-    local = [interpolate(trajectory.times, own, times, "lerp_slerp") for own in trajectory.poses]
-    poses = Poses(*(np.stack([getattr(own, part) for own in local]) for part in ("positions", "quaternions")))
-    return trajectory.rest_body.skeleton.in_root_space(poses).positions
-
-
 def largest_error(trajectory: Trajectory, body: Body, times: np.ndarray) -> float:
+    """Return the largest error of a joint's position, with linear in-betweens in the parents' spaces."""
     order = [trajectory.rest_body.joints.index(f"Joint{joint}") for joint in range(len(body.parents))]
-    return float(np.linalg.norm(at(trajectory, times)[order] - body.places(times), axis=-1).max())
+    local = interpolate(trajectory.times, trajectory.poses, times, "lerp_slerp")
+    seen = trajectory.rest_body.skeleton.in_root_space(local).positions
+    return float(np.linalg.norm(seen[order] - body.places(times), axis=-1).max())
 
 
 def test_the_densest_curve_says_the_rate(tmp_path: Path) -> None:
