@@ -13,14 +13,18 @@ from tests.thoroughness import sample
 bpy = pytest.importorskip("bpy")
 
 
+def moving(name: str) -> bpy.types.Object:
+    obj = added(name)
+    key(obj, 1, location=(0, 0, 0))
+    key(obj, 9, location=(1, 0, 0))
+    return obj
+
+
 def test_the_animated_objects_are_told_and_still_ones_are_not(saved) -> None:
-    for name in ("Lamp", "Ball", "Camera"):
-        obj = added(name)
-        if name != "Lamp":
-            key(obj, 1, location=(0, 0, 0))
-            key(obj, 9, location=(1, 0, 0))
-    painted = added("Painted")
-    key(painted, 1, color=(1, 0, 0, 1))
+    added("Lamp")
+    moving("Ball")
+    moving("Camera")
+    key(added("Painted"), 1, color=(1, 0, 0, 1))
     path = saved()
     recording = read_trajectories(path)
     assert [trajectory.name for trajectory in recording.trajectories] == ["Ball"]
@@ -81,9 +85,7 @@ def test_a_file_without_animation_is_answered_with_its_objects(saved, refusal) -
 
 @pytest.mark.parametrize("frame", [1.9e35, -2e6, float("inf")])
 def test_a_key_where_no_frame_is_costs_no_hours(saved, refusal, frame: float) -> None:
-    drill = added("Drill")
-    key(drill, 1, location=(0, 0, 0))
-    key(drill, 9, location=(1, 0, 0))
+    drill = moving("Drill")
     fcurves(drill)[0].keyframe_points[0 if frame < 0.0 else 1].co.x = frame
     _, message = refusal(saved())
     assert message.startswith("'Drill' moves from frame ")
@@ -91,9 +93,7 @@ def test_a_key_where_no_frame_is_costs_no_hours(saved, refusal, frame: float) ->
 
 
 def test_a_name_that_is_no_text_is_told(saved, refusal) -> None:
-    drill = added("Drill")
-    key(drill, 1, location=(0, 0, 0))
-    key(drill, 9, location=(1, 0, 0))
+    moving("Drill")
     path = Path(saved())
     content = path.read_bytes()
     assert b"OBDrill\0" in content

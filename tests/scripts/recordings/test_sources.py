@@ -93,11 +93,6 @@ def test_an_unknown_extension_is_answered_with_the_known_ones(write, refusal) ->
     assert not {*" ".join(OTHER_FORMATS).split()} & {*ENDINGS}
 
 
-def test_a_name_from_a_file_cannot_reach_the_terminal(write) -> None:
-    recording = read_trajectories(write("walk.bvh", bvh_text().replace("Head", "\x1b[2JHead")))
-    assert recording.note.isprintable()
-
-
 def test_a_file_that_may_not_be_read_is_told(write, refusal, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise PermissionError(13, "Permission denied")
