@@ -43,20 +43,15 @@ def refusal() -> Callable[..., tuple[int | None, str]]:
 @pytest.fixture
 def scene() -> Iterator[object]:
     """An empty scene to fill, cleared afterwards."""
-    bpy = pytest.importorskip("bpy")
-    from tests.blank import blank
-    from tests.scripts.recordings.blends import FPS
-
-    blank()
-    bpy.context.scene.render.fps = FPS
-    bpy.context.scene.frame_end = 30
-    yield bpy.context.scene
-    blank()
+    blends = pytest.importorskip("tests.scripts.recordings.blends")
+    scene = blends.blank().scene
+    scene.render.fps, scene.frame_end = blends.FPS, 30
+    yield scene
+    blends.blank()
 
 
 @pytest.fixture
 def saved(scene: object, tmp_path: Path) -> Callable[..., str]:
     """A function that saves the scene, clears it, and returns the path."""
-    from tests.scripts.recordings.blends import export
-
-    return lambda name="scene.blend": str(export(tmp_path / name))
+    blends = pytest.importorskip("tests.scripts.recordings.blends")
+    return lambda name="scene.blend": str(blends.export(tmp_path / name))
