@@ -6,6 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
+from contextlib import suppress
 from multiprocessing import get_context
 from pathlib import Path
 from random import Random
@@ -47,9 +48,10 @@ BLEND: tuple[Damage, ...] = (in_place, in_place, in_place, in_place, mutated)
 
 def read_alone(source: str, number: int) -> bool:
     """Return whether the file holds a recording that a mode can interpolate; no data-blocks are left behind."""
-    import resource
+    with suppress(ImportError):  # Windows limits no process.
+        import resource
 
-    resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time()) + 3 * PATIENCE, resource.RLIM_INFINITY))
+        resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time()) + 3 * PATIENCE, resource.RLIM_INFINITY))
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
         readable = read_and_fill_in(source, number)
