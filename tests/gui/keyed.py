@@ -82,12 +82,3 @@ def pose_the_rig(hand: Hand) -> Steps[bpy.types.Area]:
     assert bpy.context.mode == "POSE", bpy.context.mode
     yield from hand.press("A")
     return view
-
-
-def only_the_hand(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """Select the hand alone by a click on the screen."""
-    matrix = rig().evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones["Hand"].matrix
-    yield from hand.click(places.point(view, matrix.translation + 0.5 * hand_bone().length * matrix.col[1].xyz))
-    yield from hand.wait_until(
-        lambda: [bone.name for bone in bpy.context.selected_pose_bones] == ["Hand"], "the hand alone is selected"
-    )

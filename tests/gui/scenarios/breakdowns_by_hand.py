@@ -1,28 +1,37 @@
-"""Breakdown, Push and Relax by hand: from the menu, dragged with the mouse, confirmed and cancelled, undone."""
+"""Bones in Pose Mode: Breakdown and Relax from menus, dragged, confirmed, cancelled and undone; the tool Edit Path."""
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
 
+from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate
 from tests.animation.keyed import key_frames, snapshot
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.keyed import hand_bone, now, pose_the_rig
-from tests.gui.scenarios.bones_by_hand import ALIKE, SCREW
+from tests.gui.keyed import FRAMES, hand_bone, now, pose_the_rig
+from tests.gui.scenarios.trail import take_the_tool
 
 FRAME, WAY = 8, 300
+SCREW = "dq_sclerp"
+
+ALIKE = 2e-5
+"""Tolerance for equal poses, in metres and for elements of a rotation matrix."""
 
 
 def scenario(hand: Hand) -> Steps[None]:
     view = yield from pose_the_rig(hand)
-    bpy.ops.rigid_motion.set_mode(mode=SCREW)
+    yield from hand.pie("T", "E", alt=True)
+    assert hand_bone().rigid_motion.mode == SCREW
     bpy.context.scene.frame_set(FRAME)
     bpy.ops.ed.undo_push(message="Screw")
     yield from dragged_and_cancelled(hand, view)
     yield from dragged_and_confirmed(hand, view)
     yield from in_the_dope_sheet(hand, hand.area("DOPESHEET_EDITOR"))
+    yield from take_the_tool(hand, view)
+    yield from hand.press("A")
+    assert animation.key_frames(hand_bone(), selected=True).tolist() == [*FRAMES], "on the path of the bone"
 
 
 def assert_on_the_screw(factor: float) -> None:

@@ -1,15 +1,17 @@
-"""Pops on the path of the cube are marked, and buttons in the sidebar jump to them."""
+"""Pops on the path of the cube are marked, buttons in the sidebar jump to them, and Clean Motion takes them out."""
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
 
+from tests.animation.keyed import curves_of
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.keyed import cube
 
 POPS = (24, 51)
+JITTER = 0.005
 
 
 def marks(hand: Hand, view: bpy.types.Area, name: str) -> Steps[int]:
@@ -21,11 +23,12 @@ def marks(hand: Hand, view: bpy.types.Area, name: str) -> Steps[int]:
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    obj, scene = cube(), bpy.context.scene
+    obj, scene, random = cube(), bpy.context.scene, np.random.default_rng(7)
     obj.scale = (0.3, 0.3, 0.3)
     for frame in range(1, 71):
         angle = frame / 20.0
-        obj.location = (3.0 * np.cos(angle), 3.0 * np.sin(angle), 0.04 * frame + 0.25 * (frame in POPS))
+        place = (3.0 * np.cos(angle), 3.0 * np.sin(angle), 0.04 * frame + 0.25 * (frame in POPS))
+        obj.location = place + JITTER * random.normal(size=3)
         obj.keyframe_insert("location", frame=frame)
     scene.frame_end = 70
     scene.frame_set(1)
@@ -51,3 +54,25 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from hand.click(before)
     assert scene.frame_current == POPS[0], scene.frame_current
     yield from marks(hand, view, "gone-to")
+    yield from cleaned(hand, view)
+
+
+def cleaned(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """Click the button, move the keys less far in the redo panel, and undo it."""
+    shaky = jerks()
+    yield from hand.click((yield from hand.find_button(view, "UI", "rigid_motion.clean_motion")))
+    yield from hand.wait_until(lambda: jerks() < 0.3 * shaky, "the button takes the jitter out")
+    full = jerks()
+    redo = yield from hand.unfold_redo_panel(view)
+    yield from hand.picture("cleaned", places.box(view))
+    yield from hand.enter("0.5", places.redo_row(redo, 0))
+    yield from hand.wait_until(lambda: 1.5 * full < jerks() < 0.9 * shaky, "half of the jitter")
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.press("Z", ctrl=True)
+    yield from hand.wait_until(lambda: abs(jerks() - shaky) < 1e-6, "one step takes all of it back")
+
+
+def jerks() -> float:
+    """Return the mean jerkiness of the keys: their fourth differences from frame to frame."""
+    values = [[key.co.y for key in fcurve.keyframe_points] for fcurve in curves_of(cube()).values()]
+    return float(np.abs(np.diff(values, n=4)).mean())

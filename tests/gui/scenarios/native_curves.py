@@ -1,4 +1,7 @@
-"""A BVH file imported, reduced by a button to about the keys it was made with, its dense keys discarded; undone."""
+"""A BVH file imported, reduced by a button to about the keys it was made with, its dense keys discarded; undone.
+
+It is also exported by *File > Export > glTF, Reduced*, through the file dialog.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,8 @@ import addon_utils
 import bpy
 
 from rigid_motion import animation
+from rigid_motion.gltf import read_document
+from rigid_motion.gltf.tracks import read_clips
 from tests.animation.bones.hand_made import AUTOMATIC, LAST, bake_each_frame, hand_made, keys_of
 from tests.animation.bones.rigs import pose_mode
 from tests.gui import places
@@ -92,3 +97,24 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from hand.wait_until(lambda: len(bpy.data.actions) > 1, "undo brings the dense keys back into the file")
     yield from hand.press("Z", ctrl=True)
     yield from hand.wait_until(lambda: count() == dense, "one step takes the curves back")
+    yield from exported(hand, Path(tempfile.mkdtemp()) / "walk.glb")
+
+
+def exported(hand: Hand, target: Path) -> Steps[None]:
+    """Export the rig by the menu: the file has fewer keys than frames."""
+    # Events can be simulated in the first window only.
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
+    yield from hand.press("F4")
+    yield from hand.choose("glTF, Reduced (.glb)")
+    yield from hand.wait_until(lambda: hand.window.screen.areas[0].type == "FILE_BROWSER", "the file dialog opens")
+    (browser,) = hand.window.screen.areas
+    yield from hand.wait_until(lambda: browser.spaces.active.params is not None, "it has listed the folder")
+    yield from hand.picture("dialog")
+    parameters = browser.spaces.active.params
+    parameters.directory, parameters.filename = f"{target.parent}/".encode(), target.name
+    yield
+    with bpy.context.temp_override(window=hand.window, area=browser):
+        bpy.ops.file.execute()
+    yield from hand.wait_until(target.exists, "the file is written")
+    (clip,) = read_clips(read_document(target))
+    assert sum(len(track.times) for track in clip.tracks) < 0.8 * len(clip.tracks) * LAST
