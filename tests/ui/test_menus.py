@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import bpy
 import numpy as np
@@ -13,36 +14,19 @@ from rigid_motion.ui import menus
 from tests.ui.conftest import FRAMES, select_keys
 
 
-class Layout:
-    """A stand-in for a layout that records what a menu draws."""
-
-    def __init__(self):
-        self.drawn = []
-
-    def menu_pie(self):
-        return self
-
-    def separator(self):
-        pass
-
-    def menu(self, name, text="", translate=True):
-        self.drawn.append((name, "", ""))
-
-    def operator_menu_enum(self, name, prop):
-        self.drawn.append((name, "", ""))
-
-    def operator(self, name, text="", icon="NONE", translate=True):
-        properties = SimpleNamespace(mode="", on="", name="", text=text)
-        self.drawn.append((name, icon, properties))
-        return properties
-
-
 def drawn(menu):
-    """Return what a menu draws for the active object: operator or menu, icon, properties."""
-    layout = Layout()
+    """Return what a menu draws for the active object: operator, icon, properties."""
+    result = []
+
+    def operator(name, text="", icon="NONE", **_):
+        result.append((name, icon, SimpleNamespace(mode="", on="", name="", text=text)))
+        return result[-1][-1]
+
+    layout = Mock(spec=bpy.types.UILayout, operator=operator)
+    layout.menu_pie.return_value = layout
     own = {name: getattr(menu, name, None) for name in ("scope", "pie", "menu", "beside")}
     menu.draw(SimpleNamespace(layout=layout, **own), bpy.context)
-    return layout.drawn
+    return result
 
 
 PIES = [menus.RIGID_MOTION_MT_pie_view, menus.RIGID_MOTION_MT_pie_keys]

@@ -1,4 +1,4 @@
-"""F-curves edited by hand: keys dragged, inserted and typed, and cycles.
+"""F-curves edited by hand: keys dragged, and a value typed.
 
 During a drag, the pose on the screen is compared with `tests.animation.oracle` after every redraw.
 """
@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from tests.animation.keyed import curves_of, key_frames, snapshot
-from tests.animation.oracle import assert_shown, expected_worlds, shown_worlds
+from tests.animation.oracle import assert_shown, expected_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.keyed import FRAMES, cube, key_the_cube, on_screen
@@ -39,10 +39,8 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from hand.press("HOME")
     yield from hand.picture("curves")
     yield from dragged(hand, sheet)
-    yield from cycled(hand, sheet)
     sheet.type = "DOPESHEET_EDITOR"
     yield 0.3
-    yield from inserted(hand, view, sheet)
     yield from typed(hand, sheet)
 
 
@@ -72,43 +70,6 @@ def dragged(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
     for _ in range(2):
         yield from hand.press("Z", ctrl=True)
     assert_shown([cube()], WHOLE)
-
-
-def cycled(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
-    """Run Blender's *Make Cyclic*, and check the in-betweens in the repeated part."""
-    region = places.region(graph)
-    with bpy.context.temp_override(window=hand.window, area=graph, region=region):
-        bpy.ops.graph.select_all(action="SELECT")
-        bpy.ops.graph.extrapolation_type(type="MAKE_CYCLIC")
-    yield
-    if bpy.app.version >= (5, 2):
-        assert all(curve.modifiers[0].type == "CYCLES" for curve in curves_of(cube()).values())
-        bpy.context.scene.frame_set(10)
-        first = on_screen("Cube")
-        bpy.context.scene.frame_set(49)
-        np.testing.assert_allclose(on_screen("Cube"), first, atol=ALIKE)
-        bpy.context.scene.frame_set(10)
-    with bpy.context.temp_override(window=hand.window, area=graph, region=region):
-        bpy.ops.graph.extrapolation_type(type="CLEAR_CYCLIC")
-    yield
-    assert_shown([cube()], WHOLE)
-
-
-def inserted(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Steps[None]:
-    """Insert a key at the playhead: the pose on the screen stays. After undo, the keys around it are as before."""
-    keys, before = snapshot(cube()), shown_worlds([cube()], WHOLE)[0]
-    yield from hand.click(places.playhead(sheet, 15))
-    assert bpy.context.scene.frame_current == 15, bpy.context.scene.frame_current
-    yield from hand.hover(places.centre(places.region(view)))
-    yield from hand.press("I")
-    assert key_frames(cube()).tolist() == [1, 15, 20, 40]
-    assert_shown([cube()], WHOLE)
-    np.testing.assert_allclose(shown_worlds([cube()], WHOLE)[0][14], before[14], atol=ALIKE)
-    np.testing.assert_allclose(shown_worlds([cube()], WHOLE)[0], before, atol=1e-3)
-    stored = [curves_of(cube())["location", axis].evaluate(15) for axis in range(3)]
-    np.testing.assert_allclose(stored, before[14, :3, 3], atol=ALIKE)
-    yield from hand.press("Z", ctrl=True)
-    assert snapshot(cube()) == keys
 
 
 def typed(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
