@@ -44,17 +44,6 @@ def at(frame):
     bpy.context.scene.frame_set(frame)
 
 
-def test_what_is_active_holds_the_rest_where_it_is(stage):
-    mug, left, _ = stage
-    before = seen(mug)
-    assert operators.hold_in() == {"FINISHED"}
-    assert (hold_facts(mug).now.target, hold_facts(mug).until) == (left, None)
-    assert seen(mug) == pytest.approx(before, abs=1e-5)
-    grip = np.linalg.inv(seen(left)) @ seen(mug)
-    at(31)
-    assert np.linalg.inv(seen(left)) @ seen(mug) == pytest.approx(grip, abs=1e-5)
-
-
 def test_from_hand_to_hand_let_go_and_the_frames_of_it(stage):
     mug, _, right = stage
     operators.hold_in()

@@ -22,7 +22,7 @@ def drawn(menu):
         result.append((name, icon, SimpleNamespace(mode="", on="", name="", text=text)))
         return result[-1][-1]
 
-    layout = Mock(spec=bpy.types.UILayout, operator=operator)
+    layout = Mock(spec=["menu_pie", "separator", "menu", "operator_menu_enum"], operator=operator)
     layout.menu_pie.return_value = layout
     own = {name: getattr(menu, name, None) for name in ("scope", "pie", "menu", "beside")}
     menu.draw(SimpleNamespace(layout=layout, **own), bpy.context)

@@ -171,6 +171,15 @@ def test_blenders_make_cyclic_works_on_channels_with_a_mode(tool):
     assert all(first.type == "CYCLES" for first in first_modifiers(tool)) == (bpy.app.version >= (5, 2))
 
 
+def test_a_breakdown_is_keyed_by_its_factor(tool):
+    operators.set_mode(mode="dq_sclerp")
+    bpy.context.scene.frame_set(14)
+    for factor, x in ((0.0, 2.0), (1.0, 4.0)):
+        assert operators.breakdown(factor=factor) == {"FINISHED"}
+        assert tool.location[:] == pytest.approx((x, 0.0, 0.0), abs=1e-5)
+    assert key_frames(tool).tolist() == sorted([*FRAMES.tolist(), 14.0])
+
+
 def test_the_tolerance_to_begin_with_is_a_millimetre_in_any_unit(tool):
     bpy.context.scene.unit_settings.scale_length = 0.01
     assert first_tolerance(bpy.context.scene, [transform_of(tool)]) == pytest.approx(0.1)
