@@ -25,7 +25,10 @@ def report_edits() -> None:
 
 
 def test_an_edit_that_does_not_matter_leaves_the_path(scene, obj):
+    obj.parent = key(new_object("Table"))
+    report_edits()
     path = path_of(obj, bpy.context)
+    scene.frame_set(20)
     obj.color = (1, 0, 0, 1)
     obj["note"] = 7
     report_edits()

@@ -29,7 +29,6 @@ from tests.animation.keyed import curves_of
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import FRAMES, key, new_object
 from tests.ui.overlay.seen import assert_where_it_is_seen
-from tests.ui.rigs import new_rig
 
 WHOLE = np.arange(FRAMES[0], FRAMES[-1] + 1)
 ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
@@ -76,7 +75,7 @@ def test_each_segment_runs_in_its_own_mode(scene):
     assert on(path, path.desired, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
 
 
-@pytest.mark.parametrize("parenting", ["bone", "vertex", "inverse"])
+@pytest.mark.parametrize("parenting", ["vertex", "inverse"])
 def test_the_world_is_where_the_parent_takes_the_path(scene, parenting):
     obj = key(new_object())
     if parenting == "inverse":
@@ -85,8 +84,6 @@ def test_the_world_is_where_the_parent_takes_the_path(scene, parenting):
         bpy.context.view_layer.update()
         obj.matrix_parent_inverse = parent.matrix_world.inverted()
         parent.location = (0, 5, 0)
-    elif parenting == "bone":
-        obj.parent, obj.parent_type, obj.parent_bone = new_rig(), "BONE", "Hand"
     else:
         obj.parent, obj.parent_type, obj.parent_vertices = mesh(), "VERTEX", (2, 0, 0)
     set_mode(obj, "dq_sclerp")
@@ -137,21 +134,13 @@ def test_samples_run_evenly_from_end_to_end_over_whole_frames_as_many_as_a_round
         )
 
 
-def test_without_a_second_key_there_is_no_path(scene):
-    assert path_of(new_object("None"), bpy.context) is None
-    assert path_of(key(new_object("One"), frames=(7,)), bpy.context) is None
-    still = new_object("Faded")
+def test_what_has_no_second_key_or_is_refused_or_driven_has_no_path(scene):
+    still, enveloped, driven = new_object("Faded"), key(new_object("Enveloped")), key(new_object("Driven"))
     still.keyframe_insert("hide_viewport", frame=1)
-    assert path_of(still, bpy.context) is None
-
-
-def test_what_rigid_motion_refuses_or_a_driver_moves_has_no_path(scene):
-    enveloped = key(new_object("Enveloped"))
     curves_of(enveloped)["location", 0].modifiers.new("ENVELOPE")
-    driven = key(new_object("Driven"))
     driven.driver_add("location", 0)
-    assert path_of(enveloped, bpy.context) is None
-    assert path_of(driven, bpy.context) is None
+    for obj in (new_object("None"), key(new_object("One"), frames=(7,)), still, enveloped, driven):
+        assert path_of(obj, bpy.context) is None, obj.name
 
 
 def test_a_line_that_leads_back_is_not_thinned_to_a_point():

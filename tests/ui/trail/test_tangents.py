@@ -18,7 +18,7 @@ from tests.animation.bones.rigs import in_turn
 from tests.animation.held import worlds
 from tests.animation.keyed import Carrier, curves_of, snapshot
 from tests.animation.scenes import FRAMES, new_object, write
-from tests.ui.trail.conftest import CARRIERS, MIDDLE, choose, held_prop
+from tests.ui.trail.conftest import CARRIERS, MIDDLE, choose
 
 pytestmark = pytest.mark.any_blender
 
@@ -133,18 +133,6 @@ def test_a_linear_segment_gets_handles_and_keeps_its_other_speed(scene):
     operators.drag_path_tangent(speed=3.0, after=True, frame=MIDDLE, target=tool.name)
     assert np.linalg.norm(velocity(tool, True)) == pytest.approx(3.0, abs=0.1)
     assert np.diff(worlds(tool, [FRAMES[2] - INSTANT, FRAMES[2]])[:, :3, 3], axis=0) == pytest.approx(before, rel=0.02)
-
-
-@pytest.mark.parametrize(("number", "after"), [(0, True), (1, False), (2, True), (3, False)])
-def test_what_is_held_is_faster_in_its_hand_alone(scene, number, after):
-    prop = held_prop("free")
-    keys = key_frames(prop)
-    choose(prop, keys[number])
-    frames = np.union1d(np.arange(keys[0], keys[-1], 0.5), keys)
-    ends = sorted(keys[[number, min(max(number + (1 if after else -1), 0), len(keys) - 1)]])
-    others = worlds(prop, outside(ends, frames))
-    operators.drag_path_tangent(speed=3.0, after=after, frame=keys[number], target=prop.name)
-    assert worlds(prop, outside(ends, frames)) == pytest.approx(others, abs=2e-5)
 
 
 def bending_operator(tool: Carrier, after: bool) -> SimpleNamespace:
