@@ -13,11 +13,10 @@ import pytest
 from rigid_motion.animation import set_mode
 from tests.animation.bones.poses import seen
 from tests.animation.bones.rigs import pose_mode, select_bones
-from tests.rigs.poses import key_controls
+from tests.animation.scenes import key
 
-HAND, TORSO = "hand_ik.L", "torso"
+HAND = "hand_ik.L"
 PARENTS = ("None", "Root", "Torso", "Hips", "Chest", "Head")
-POSES = {HAND: ((0.3, -0.2, 0.4), (0.9, 0.7, 1.2)), TORSO: ((0.2, 0.3, 0.1), (0.2, 0.5, 1.4))}
 STAYS = 1e-5
 """Tolerance in metres, and for components of axes."""
 
@@ -27,8 +26,8 @@ def rig(human, extension) -> Iterator[bpy.types.Object]:
     """The human in Pose Mode with its own operators, in the mode Screw on the left hand and the torso."""
     script = human["rig_ui"].as_module()
     pose_mode(human)
-    key_controls(human, POSES, (1, 21))
-    set_mode([human.pose.bones[name] for name in POSES], "dq_sclerp")
+    moved = [key(human.pose.bones[name], (1.0, 21.0)) for name in (HAND, "torso")]
+    set_mode(moved, "dq_sclerp")
     yield human
     script.unregister()
 
