@@ -23,9 +23,11 @@ operators = bpy.ops.rigid_motion
 
 
 @pytest.mark.parametrize(("by", "expected"), [(500.0, FRAMES[2] - 1.0), (-500.0, FRAMES[0] + 1.0)])
-def test_a_retimed_key_stops_at_its_neighbours(scene, by, expected):
+def test_a_retimed_key_has_the_same_pose_and_stops_at_its_neighbours(scene, by, expected):
     carrier = choose(CARRIERS["QUATERNION"](), MIDDLE)
+    before = worlds(carrier, [MIDDLE])
     operators.retime_path_keys(frames=by)
+    assert worlds(carrier, [expected]) == pytest.approx(before, abs=1e-5)
     assert key_frames(carrier).tolist() == [FRAMES[0], expected, *FRAMES[2:]]
 
 
@@ -41,19 +43,24 @@ def test_what_is_tried_first_has_no_say_in_what_comes_next(scene):
     assert snapshot(carrier) == before
 
 
-def test_a_key_is_inserted_and_selected_and_none_on_another(scene):
-    carrier = choose(CARRIERS["QUATERNION"]())
+def test_a_key_is_inserted_and_selected_on_the_motion_and_none_on_another(scene):
+    carrier, frames = choose(CARRIERS["QUATERNION"]()), np.arange(FRAMES[0], FRAMES[-1] + 1.0)
+    motion = worlds(carrier, frames)
     assert operators.insert_path_key(frame=17.0) == {"FINISHED"}
     assert key_frames(carrier).tolist() == sorted((*FRAMES, 17.0))
     assert key_frames(carrier, selected=True).tolist() == [17.0]
+    assert worlds(carrier, frames) == pytest.approx(motion, abs=1e-4)
     before = snapshot(carrier)
     assert operators.insert_path_key(frame=MIDDLE) == {"CANCELLED"}
     assert snapshot(carrier) == before
 
 
-def test_all_keys_may_be_deleted(scene):
-    carrier = choose(CARRIERS["QUATERNION"](), *FRAMES)
+def test_selected_keys_and_all_keys_may_be_deleted(scene):
+    carrier = choose(CARRIERS["QUATERNION"](), *FRAMES[1:3])
     set_mode(carrier, "motor_spline")
+    operators.delete_path_keys()
+    assert key_frames(carrier).tolist() == [FRAMES[0], FRAMES[-1]]
+    select_keys(carrier, *FRAMES)
     operators.delete_path_keys()
     assert not [c for (path, _), c in curves_of(carrier).items() if path in ("location", "rotation_quaternion")]
 
