@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bpy
+import numpy as np
 import pytest
 
 from rigid_motion import animation
@@ -20,7 +21,8 @@ from rigid_motion.ui.targets import (
     scope_for,
     targets_of,
 )
-from tests.animation.bones.rigs import select_bones
+from tests.animation.bones.rigs import select_bones, select_only
+from tests.animation.layered import key_base, new, seen
 from tests.animation.scenes import editor
 from tests.rigs.recorded import recorded_rig
 from tests.ui.conftest import FRAMES, keyed, select_keys
@@ -151,3 +153,21 @@ def test_key_poses_begin_with_a_larger_tolerance_for_as_long_as_nobody_sets_one(
         with pytest.raises(RuntimeError):
             operators.reduce_keys(shared=True, **tolerances)
     assert asked == pytest.approx([offered, 0.5 * offered, offered])
+
+
+def test_a_rig_whose_bones_alone_have_keys_gets_a_layer_as_a_whole_which_is_merged(extension):
+    bone = key_base(new("bone", "XYZ"), "dq_sclerp")
+    rig, before = bone.id_data, seen(bone)
+    select_only(rig)
+    assert not operators.merge_layer.poll()
+    assert operators.add_layer() == {"FINISHED"}
+    assert not operators.add_layer.poll()
+    rig.location.x = 1.0
+    rig.keyframe_insert("location", frame=20)
+    bpy.context.view_layer.update()
+    assert np.abs(seen(bone) - before).max() < 1e-5, "bones play on below"
+    expected = seen(rig)
+    assert operators.merge_layer(tolerance=0.002) == {"FINISHED"}
+    assert not operators.merge_layer.poll()
+    assert np.abs(seen(rig) - expected).max() < 0.003
+    assert np.abs(seen(bone) - before).max() < 1e-5

@@ -1,7 +1,6 @@
-"""Pictures of the modes for the pages in docs/: a small scene shows the character of each mode, and checks it.
+"""Pictures of the modes for the pages in docs/: a small scene shows the character of each mode.
 
-In every scene bodies move from key to key, with ghosts on the way, and the overlay draws their paths. Before a picture
-is taken, what it should show is measured on the poses that Blender evaluates.
+In every scene bodies move from key to key, with ghosts on the way, and the overlay draws their paths.
 """
 
 from __future__ import annotations
@@ -13,9 +12,10 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Quaternion, Vector
 
+from examples import figure
 from tests.animation.bones.rigs import select_only
 from tests.animation.keyed import curves_of
-from tests.animation.oracle import assert_shown, shown_worlds
+from tests.animation.oracle import shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 
@@ -38,9 +38,6 @@ WOOD, METAL, STAND = (0.72, 0.48, 0.26), (0.55, 0.58, 0.62), (0.30, 0.31, 0.33)
 
 GHOST = 0.22
 """Opacity of a ghost."""
-
-Box = tuple[Sequence[float], Sequence[float]]
-"""Centre and size of a box."""
 
 
 def scenario(hand: Hand) -> Steps[None]:
@@ -96,9 +93,6 @@ def lid(view: bpy.types.Area) -> float:
         key(cover, frame, turn @ Vector((0.6, 0, 0.05)), turn)
     native = shown(cover)
     choose(cover, SCREW)
-    hinge = (-0.6, 0, -0.05)
-    assert stray(native, hinge) > 0.2, "Blender's own lid leaves its hinge"
-    assert stray(shown(cover), hinge) < 1e-5, "the screw's does not"
     ghosts(cover, native, NATIVE, (13,))
     ghosts(cover, shown(cover), MODE, (8, 13, 18))
     label("Blender", (-0.42, -0.4, -0.16), NATIVE, view)
@@ -115,13 +109,9 @@ def hammer(view: bpy.types.Area) -> float:
     for frame, angle in ((1, -70.0), (25, 65.0)):
         turn = Quaternion((0, 1, 0), math.radians(angle))
         key(tool, frame, wrist - turn @ grip, turn)
-    native = shown(tool)
     choose(tool, STRAIGHT)
     straight = shown(tool)
     choose(tool, SCREW)
-    assert stray(native, grip) > 0.5
-    assert stray(straight, grip) > 0.5, "along a straight line the grip leaves the hand too"
-    assert stray(shown(tool), grip) < 1e-5
     ghosts(tool, straight, NATIVE, (9, 13, 17))
     ghosts(tool, shown(tool), MODE, (9, 13, 17))
     body("Hand", STAND, (wrist, (0.16, 0.3, 0.16)))
@@ -141,9 +131,6 @@ def throw(view: bpy.types.Area) -> float:
         choose(stick, mode)
         color = MODE if mode == STRAIGHT else NATIVE
         ghosts(stick, shown(stick), color, (1, 7, 13, 19, 25))
-    straight, bent = (shown(stick)[:, 2, 3] for stick in sticks)
-    assert np.ptp(straight) < 1e-5
-    assert np.ptp(bent) > 0.8
     show_chosen_paths()
     label("Straight", (0, 0, -0.28), MODE, view)
     label("Screw", (-0.7, 0, 1.02), MODE, view)
@@ -154,7 +141,6 @@ def throw(view: bpy.types.Area) -> float:
 def flight(view: bpy.types.Area) -> float:
     """Show two darts with the same four keys. Smooth Screw has no corner at them."""
     aim(view, (0, 0, 0), (0, -0.1, 0))
-    sharpest = {}
     for mode, x, name in ((SCREW, -1.25, "Screw"), (SMOOTH, 1.25, "Smooth Screw")):
         dart = body(name, METAL, ((0, 0, 0), (0.34, 0.06, 0.06)), ((-0.15, 0, 0), (0.1, 0.22, 0.03)))
         for frame, place, heading in (
@@ -166,11 +152,8 @@ def flight(view: bpy.types.Area) -> float:
             key(dart, frame, place, Quaternion((0, 0, 1), math.radians(heading)))
         run_evenly(dart)
         choose(dart, mode)
-        sharpest[mode] = sharpest_bend(shown(dart))
         ghosts(dart, shown(dart), MODE, range(4, 37, 3))
         label(name, (x, -0.95, 0), MODE, view)
-    assert sharpest[SCREW] > 60.0, sharpest
-    assert sharpest[SMOOTH] < 30.0, sharpest
     show_chosen_paths()
     bpy.context.scene.rigid_motion_overlay.tick_step = 3
     bpy.context.scene.frame_set(0)
@@ -188,18 +171,11 @@ def aim(view: bpy.types.Area, degrees: Sequence[float], middle: Sequence[float])
     space.view_location = middle
 
 
-def body(name: str, color: Color, *boxes: Box) -> bpy.types.Object:
+def body(name: str, color: Color, *boxes: figure.Box) -> bpy.types.Object:
     """Make a body of boxes around its origin."""
-    corners, faces = [], []
-    for middle, size in boxes:
-        first = len(corners)
-        unit = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
-        corners += [[m + s * u for m, s, u in zip(middle, size, corner, strict=True)] for corner in unit]
-        sides = (0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)
-        faces += [[first + corner for corner in side] for side in sides]
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(corners, [], faces)
-    return add(name, mesh, (*linear(color), 1.0))
+    obj = figure.boxes(name, bpy.data.materials.new(name), *boxes)
+    obj.rotation_mode, obj.color = "QUATERNION", (*linear(color), 1.0)
+    return obj
 
 
 def add(name: str, data: bpy.types.ID, color: Sequence[float]) -> bpy.types.Object:
@@ -239,25 +215,9 @@ def show_chosen_paths() -> None:
 
 
 def shown(obj: bpy.types.Object) -> np.ndarray:
-    """Return the object's world matrices on all frames from its first to its last key, after checking them."""
+    """Return the object's world matrices on all frames from its first to its last key."""
     first, last = (int(frame) for frame in obj.animation_data.action.frame_range)
-    frames = range(first, last + 1)
-    assert_shown([obj], frames)
-    return shown_worlds([obj], frames)[0]
-
-
-def stray(worlds: np.ndarray, point: Sequence[float]) -> float:
-    """Return the largest distance of a point of a body from its place on the first frame."""
-    way = (worlds @ np.array((*point, 1.0)))[:, :3]
-    return float(np.linalg.norm(way - way[0], axis=1).max())
-
-
-def sharpest_bend(worlds: np.ndarray) -> float:
-    """Return the largest angle between the path's steps of neighbouring frames, in degrees."""
-    steps = np.diff(worlds[:, :3, 3], axis=0)
-    steps /= np.linalg.norm(steps, axis=1, keepdims=True)
-    alike = np.einsum("ij,ij->i", steps[:-1], steps[1:])
-    return float(np.degrees(np.arccos(np.clip(alike, -1.0, 1.0))).max())
+    return shown_worlds([obj], range(first, last + 1))[0]
 
 
 def ghosts(obj: bpy.types.Object, worlds: np.ndarray, color: Color, frames: Sequence[int]) -> None:
