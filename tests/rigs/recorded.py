@@ -2,38 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import bpy
 import numpy as np
 
 from rigid_motion.animation import write_channel
 from rigid_motion.motion.twists import exponential
+from tests.animation.bones.rigs import Rest, new_rig
 
 FRAMES = np.arange(1.0, 91.0)
 NAMES = ("Root", "Spine", "Head", "Arm.L", "Hand.L", "Arm.R", "Hand.R")
 PARENTS = {"Spine": "Root", "Head": "Spine", "Arm.L": "Spine", "Hand.L": "Arm.L", "Arm.R": "Spine", "Hand.R": "Arm.R"}
 
 
-def recorded_rig(rotation_mode: str = "QUATERNION", *, still: tuple[str, ...] = (), seed: int = 0) -> bpy.types.Object:
+def recorded_rig(rotation_mode: str = "QUATERNION", *, still: tuple[str, ...] = ()) -> bpy.types.Object:
     """Return a body of a few bones with a key on every frame, as in imported motion capture."""
-    rig = bpy.data.objects.new("Body", bpy.data.armatures.new("Body"))
-    bpy.context.collection.objects.link(rig)
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    random = np.random.default_rng(5)
+    rig, random = new_rig("Body", list(rests()), rotation_mode), np.random.default_rng(0)
     for name in NAMES:
-        bone = rig.data.edit_bones.new(name)
-        parent = rig.data.edit_bones.get(PARENTS.get(name, ""))
-        bone.parent = parent
-        bone.head = parent.tail if parent else (0.0, 0.0, 0.5)
-        bone.tail = np.array(bone.head) + random.normal(size=3) * (0.1, 0.1, 0.2) + (0.0, 0.0, 0.25)
-        bone.roll = 0.4
-    bpy.ops.object.mode_set(mode="OBJECT")
-    random = np.random.default_rng(seed)
-    for name in NAMES:
-        rig.pose.bones[name].rotation_mode = rotation_mode
         if name not in still:
             record(rig, name, random)
     return rig
+
+
+def rests() -> Iterator[Rest]:
+    random, tails = np.random.default_rng(5), {"": np.array((0.0, 0.0, 0.5))}
+    for name in NAMES:
+        parent = PARENTS.get(name, "")
+        tails[name] = tails[parent] + random.normal(size=3) * (0.1, 0.1, 0.2) + (0.0, 0.0, 0.25)
+        yield Rest(name, tails[parent], tails[name], parent, roll=0.4)
 
 
 def record(rig: bpy.types.Object, name: str, random: np.random.Generator) -> None:

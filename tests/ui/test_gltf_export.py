@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import bpy
 import pytest
 
 from rigid_motion import animation
+from tests.animation.scenes import key, new_object
 from tests.gltf.player import File, off
 
 TOLERANCE = 0.01
@@ -17,17 +17,10 @@ TOLERANCE = 0.01
 
 @pytest.fixture
 def cube(extension) -> bpy.types.Object:
-    """A cube on a screw motion between three keys, 2 m and 150 degrees."""
+    """An object a metre large, on a screw motion between two keys."""
     mesh = bpy.data.meshes.new("Cube")
     mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
-    obj = bpy.data.objects.new("Cube", mesh)
-    bpy.context.scene.collection.objects.link(obj)
-    obj.rotation_mode = "QUATERNION"
-    for frame, x, degrees in ((1, 0.0, 0.0), (30, 1.0, 150.0), (60, 2.0, 20.0)):
-        obj.location.x = x
-        obj.rotation_quaternion = (math.cos(math.radians(degrees) / 2), 0.0, 0.0, math.sin(math.radians(degrees) / 2))
-        obj.keyframe_insert("location", frame=frame)
-        obj.keyframe_insert("rotation_quaternion", frame=frame)
+    obj = key(new_object("Cube", data=mesh), (1.0, 60.0))
     extension.scene.frame_start, extension.scene.frame_end = 1, 60
     animation.set_mode(obj, "dq_sclerp")
     bpy.context.view_layer.update()

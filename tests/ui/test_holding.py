@@ -11,19 +11,12 @@ import pytest
 from rigid_motion.animation import hold_facts, hold_in, pass_frames
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.ui import held_in, holding
-from tests.animation.bones.rigs import select_bones
+from tests.animation.bones.rigs import select_bones, select_only
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import key, new_object
 from tests.ui.rigs import FRAMES, new_rig
 
 operators = bpy.ops.rigid_motion
-
-
-def select(*items, active):
-    """Select these objects, and make one active."""
-    for obj in bpy.context.view_layer.objects:
-        obj.select_set(obj in (*items, active))
-    bpy.context.view_layer.objects.active = active
 
 
 @pytest.fixture
@@ -32,7 +25,7 @@ def stage(extension):
     mug, left, right = new_object("Mug"), key(new_object("Left"), FRAMES, seed=1), key(new_object("Right"), FRAMES)
     mug.location = (0.4, 0.2, 1.0)
     bpy.context.scene.frame_set(11)
-    select(mug, active=left)
+    select_only(left, mug)
     return mug, left, right
 
 
@@ -48,7 +41,7 @@ def test_from_hand_to_hand_let_go_and_the_frames_of_it(stage):
     mug, _, right = stage
     operators.hold_in()
     at(21)
-    select(mug, active=right)
+    select_only(right, mug)
     operators.hold_in()
     facts = hold_facts(mug)
     assert (facts.now.target, facts.switch, facts.frames) == (right, 21.0, 4)
@@ -69,7 +62,7 @@ def test_the_grip_is_matched(stage):
     at(21)
     operators.let_go()
     at(31)
-    select(mug, active=left)
+    select_only(left, mug)
     operators.hold_in()
     assert np.linalg.inv(seen(left)) @ seen(mug) != pytest.approx(grip, abs=1e-2)
     assert operators.match_grip() == {"FINISHED"}
@@ -79,7 +72,7 @@ def test_the_grip_is_matched(stage):
 def test_a_known_holder_is_named(stage):
     mug, _, right = stage
     operators.hold_in()
-    select(active=mug)
+    select_only(mug)
     at(21)
     assert operators.hold_in_known(target=right.name_full) == {"FINISHED"}
     assert hold_facts(mug).now.target == right
@@ -89,15 +82,15 @@ def test_a_known_holder_is_named(stage):
 
 def test_what_holds_another_is_not_let_go_with_it(stage):
     mug, left, right = stage
-    select(left, active=right)
+    select_only(right, left)
     operators.hold_in()
-    select(mug, active=left)
+    select_only(left, mug)
     operators.hold_in()
     at(15)
     assert [item.carrier for item in holding.held(bpy.context)] == [mug]
     operators.let_go()
     assert (hold_facts(mug).now, hold_facts(left).now.target) == (None, right)
-    select(left, active=mug)
+    select_only(mug, left)
     assert {item.carrier for item in holding.held(bpy.context)} == {left, mug}
 
 
@@ -106,7 +99,7 @@ def test_of_an_active_rig_the_active_bone_holds(stage):
     rig = new_rig()
     rig.data.bones.active = rig.data.bones["Hand"]
     bpy.ops.object.mode_set(mode="OBJECT")
-    select(mug, active=rig)
+    select_only(rig, mug)
     operators.hold_in()
     assert (hold_facts(mug).now.target, hold_facts(mug).now.bone) == (rig, "Hand")
     at(21)
@@ -132,7 +125,7 @@ def test_a_bone_is_held_in_the_active_bone_of_another_rig(extension):
     sword, hand = (new_rig(name) for name in ("Sword", "Body"))
     hand.location = (0.5, 0.0, 0.0)
     bpy.ops.object.mode_set(mode="OBJECT")
-    select(sword, active=hand)
+    select_only(hand, sword)
     bpy.ops.object.mode_set(mode="POSE")
     select_bones(sword, "Hip")
     select_bones(hand, "Hand")
@@ -147,7 +140,7 @@ def test_a_bone_is_held_in_the_active_bone_of_another_rig(extension):
 @pytest.mark.parametrize("name", ["hold_in", "let_go", "match_grip", "pass_frames"])
 def test_one_alone_is_neither_held_nor_let_go(stage, name):
     mug, *_ = stage
-    select(active=mug)
+    select_only(mug)
     assert not getattr(operators, name).poll()
     reason = holding.FIRST_AND_LAST if name == "hold_in" else holding.NOTHING_HELD
     with pytest.raises(RuntimeError, match=reason.partition(":")[0]):
@@ -158,7 +151,7 @@ def test_where_it_passes_the_panel_says_how_far_hands_are_apart_and_sets_over_ho
     mug, _, right = stage
     operators.hold_in()
     at(21)
-    select(mug, active=right)
+    select_only(right, mug)
     operators.hold_in()
     scene = bpy.context.scene
     assert held_in.apart_text(scene, hold_facts(mug)) == "Hands 0 m, 0.0° apart at 21"

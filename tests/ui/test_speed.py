@@ -14,6 +14,7 @@ from rigid_motion.ui.speed import speeds_of
 from tests.animation.bones.rigs import select_only
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, new_object, write
+from tests.ui.conftest import select_keys
 
 pytestmark = pytest.mark.any_blender
 
@@ -65,9 +66,7 @@ def test_it_says_how_even_it_is(extension, capfd):
 
 def test_selected_keys_alone(extension):
     obj = keyed()
-    for fcurve in obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
-        for point in fcurve.keyframe_points:
-            point.select_control_point = point.co.x > 5.0
+    select_keys(obj, *FRAMES[1:])
     operators.equalise_speed(selected=True)
     frames = key_frames(obj)
     assert frames[[0, 1, 3]].tolist() == [1.0, 11.0, 41.0]
