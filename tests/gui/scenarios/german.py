@@ -5,13 +5,15 @@ Blender's module for Python has no languages, so the translation is tested in th
 
 from __future__ import annotations
 
-import math
 from importlib import import_module
 
 import addon_utils
 import bpy
 from bpy.app.translations import pgettext_iface, pgettext_rpt, pgettext_tip
 
+from tests.animation.bones.rigs import select_only
+from tests.animation.keyed import curves_of
+from tests.animation.scenes import turning
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.keyed import cube, extension
@@ -19,19 +21,6 @@ from tests.gui.keyed import cube, extension
 SCREW = "dq_sclerp"
 
 NOTHING_REDUCED = "The keys here are neither reduced nor cleaned"
-
-
-def key(turns: dict[int, float]) -> None:
-    """Replace the keys of the cube: on these frames, moved along x and rotated about z by degrees."""
-    obj = cube()
-    obj.animation_data_clear()
-    obj.rotation_mode = "QUATERNION"
-    for frame, turn in turns.items():
-        obj.location = (frame / 10 - 2, 0, 0)
-        angle = math.radians(turn)
-        obj.rotation_quaternion = (math.cos(angle / 2), 0, 0, math.sin(angle / 2))
-        obj.keyframe_insert("location", frame=frame)
-        obj.keyframe_insert("rotation_quaternion", frame=frame)
 
 
 def speak(language: str) -> None:
@@ -46,33 +35,27 @@ def notes(frame: int) -> list[str]:
     return [text for _, text in import_module(f"{extension().module}.ui.notes").facts_and_notes(cube(), frame)[1]]
 
 
-def refusal() -> str:
-    """Return Blender's report when the mode of the cube is refused."""
-    try:
-        bpy.ops.rigid_motion.set_mode(mode=SCREW)
-    except RuntimeError as error:
-        return str(error)
-    raise AssertionError("the cube was not refused")
-
-
 def scenario(hand: Hand) -> Steps[None]:
     """An animator works in German, then in English again, then without the extension."""
     speak("de_DE")
+    bpy.data.objects.remove(cube())
+    select_only(turning("Cube", (0.0, 90.0, 269.0), (1.0, 20.0, 40.0)))
     view = hand.area("VIEW_3D")
-    yield from reported()
     yield from in_the_panel(hand, view)
+    yield from refused()
     yield from in_menus(hand, view)
     yield from of_others(hand, view)
     yield from preferences(hand)
     yield from other_languages()
 
 
-def reported() -> Steps[None]:
-    """Check reports, and texts that operators assemble."""
-    key({1: 0, 20: 90, 40: 100})
-    curve = cube().animation_data.action.layers[0].strips[0].channelbags[0].fcurves.find("location", index=1)
-    curve.modifiers.new("ENVELOPE")
-    assert "Position Y hat eine Hüllkurve" in refusal(), refusal()
+def refused() -> Steps[None]:
+    """Check a refusal, and a tooltip that an operator assembles."""
+    modifiers = curves_of(cube())["location", 1].modifiers
+    envelope = modifiers.new("ENVELOPE")
+    (note,) = notes(10)
+    assert "Position Y hat eine Hüllkurve" in note, note
+    modifiers.remove(envelope)
     operators = import_module(f"{extension().module}.ui.operators")
     tooltip = pgettext_tip(operators.RIGID_MOTION_OT_unbake.bl_description)
     assert tooltip.startswith("Gebackenem die Aktion zurückgeben"), tooltip
@@ -83,7 +66,6 @@ def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """Take pictures of the panel where space is short and where notes are long."""
     yield from hand.open_sidebar(view, "Animation")
     sidebar = places.region(view, "UI")
-    key({1: 0, 20: 90, 40: 269})
     bpy.ops.rigid_motion.set_mode(mode=SCREW)
     bpy.context.scene.rigid_motion_overlay.show_paths = True
     assert notes(10) == []
