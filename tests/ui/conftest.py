@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import bpy
 import numpy as np
 import pytest
 
+from rigid_motion.ui.overlay import drawing
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import turning
+from tests.complaints import complaints
 
 FRAMES = np.array((1.0, 11.0, 21.0, 41.0))
+
+
+@pytest.fixture
+def scene(
+    extension: bpy.types.Context, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[bpy.types.Scene]:
+    """The scene of a new file without objects, paths shown. An error of the overlay fails the test."""
+    # An error that was logged in an earlier test is logged again.
+    monkeypatch.setattr(drawing, "_complaint", "")
+    extension.scene.rigid_motion_overlay.show_paths = True
+    yield extension.scene
+    assert complaints(caplog) == []
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from rigid_motion.animation.transforms import transform_of
 from rigid_motion.ui import held_in, holding
 from tests.animation.bones.rigs import select_bones, select_only
 from tests.animation.keyed import curves_of
+from tests.animation.oracle import world_of
 from tests.animation.scenes import key, new_object
 from tests.ui.rigs import FRAMES, new_rig
 
@@ -27,10 +28,6 @@ def stage(extension):
     bpy.context.scene.frame_set(11)
     select_only(left, mug)
     return mug, left, right
-
-
-def seen(obj):
-    return np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
 
 
 def at(frame):
@@ -58,15 +55,15 @@ def test_from_hand_to_hand_let_go_and_the_frames_of_it(stage):
 def test_the_grip_is_matched(stage):
     mug, left, _ = stage
     operators.hold_in()
-    grip = np.linalg.inv(seen(left)) @ seen(mug)
+    grip = np.linalg.inv(world_of(left)) @ world_of(mug)
     at(21)
     operators.let_go()
     at(31)
     select_only(left, mug)
     operators.hold_in()
-    assert np.linalg.inv(seen(left)) @ seen(mug) != pytest.approx(grip, abs=1e-2)
+    assert np.linalg.inv(world_of(left)) @ world_of(mug) != pytest.approx(grip, abs=1e-2)
     assert operators.match_grip() == {"FINISHED"}
-    assert np.linalg.inv(seen(left)) @ seen(mug) == pytest.approx(grip, abs=1e-5)
+    assert np.linalg.inv(world_of(left)) @ world_of(mug) == pytest.approx(grip, abs=1e-5)
 
 
 def test_a_known_holder_is_named(stage):

@@ -1,17 +1,38 @@
-"""The path cache: a path is computed once, and again only after an edit that it depends on."""
+"""The path cache: a path is computed once, and again only after an edit that it depends on.
+
+Without a window, drawing stays silent or logs an error once, and never raises.
+"""
 
 from __future__ import annotations
+
+import logging
 
 import bpy
 import numpy as np
 import pytest
 
 from rigid_motion.animation import set_mode
+from rigid_motion.ui.overlay import drawing
 from rigid_motion.ui.overlay.cache import MAX_SPARE_PATHS, keep_only, notice_selection, path_of
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import key, new_object
+from tests.complaints import complaints
 
-pytestmark = pytest.mark.any_blender
+
+def test_without_a_path_no_graphics_card_is_needed(scene, caplog):
+    new_object().select_set(True)
+    drawing.draw_paths()
+    assert complaints(caplog) == []
+
+
+def test_what_is_wrong_is_told_once_and_never_raised(scene, caplog):
+    key(new_object()).select_set(True)
+    assert bpy.app.background
+    with caplog.at_level(logging.ERROR):
+        drawing.draw_paths()
+        drawing.draw_paths()
+    assert complaints(caplog) == ["The paths could not be drawn"]
+    caplog.clear()
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ from tests.animation.keyed import Carrier, curves_of, snapshot
 from tests.animation.layered import key_offset
 from tests.animation.scenes import FRAMES, key, new_object
 from tests.ui.conftest import select_keys
-from tests.ui.trail.conftest import CARRIERS, MIDDLE, MOVE, TURN, about, bone, choose, held_prop
+from tests.ui.trail.carriers import CARRIERS, MIDDLE, MOVE, TURN, about, bone, choose, held_prop
 
 operators = bpy.ops.rigid_motion
 

@@ -18,7 +18,7 @@ from tests.animation.bones.rigs import in_turn
 from tests.animation.held import worlds
 from tests.animation.keyed import Carrier, curves_of, snapshot
 from tests.animation.scenes import FRAMES, new_object, write
-from tests.ui.trail.conftest import CARRIERS, MIDDLE, choose
+from tests.ui.trail.carriers import CARRIERS, MIDDLE, choose
 
 pytestmark = pytest.mark.any_blender
 

@@ -1,4 +1,4 @@
-"""Fixtures for editing paths: a scene whose overlay shows paths, and objects and bones with keys to edit."""
+"""Objects and bones with keys on paths to edit."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 
 import bpy
 import numpy as np
-import pytest
 from mathutils import Matrix, Quaternion
 
 from rigid_motion.animation import set_mode
@@ -20,13 +19,6 @@ from tests.ui.rigs import key_bone, new_rig
 MOVE, TURN = Matrix.Translation((0.3, -0.5, 0.8)), Quaternion((0.3, -0.5, 0.8), 0.7)
 
 MIDDLE = FRAMES[1]
-
-
-@pytest.fixture
-def scene(extension: bpy.types.Context) -> bpy.types.Scene:
-    """The scene of a new file without objects, paths shown."""
-    extension.scene.rigid_motion_overlay.show_paths = True
-    return extension.scene
 
 
 def new_tool(order: str) -> Callable[[], Carrier]:
