@@ -102,22 +102,6 @@ def test_where_modifiers_are_many_their_number_is_noted(extension):
     assert int(texts[-1].partition(" modifiers on a channel")[0]) > notes.MANY_MODIFIERS
 
 
-def test_a_second_user_of_a_slot_that_differs_has_a_note_until_the_two_are_alike(tool):
-    other = new_object("Other")
-    data = other.animation_data_create()
-    data.action, data.action_slot = tool.animation_data.action, tool.animation_data.action_slot
-    set_mode(tool, "dq_sclerp")
-    assert notes_on(other) == ([], "dq_sclerp")
-    other.delta_rotation_quaternion = (0.5, 0.5, 0.5, 0.5)
-    bpy.context.view_layer.update()
-    messages = notes_on(tool)[0] + notes_on(other)[0]
-    assert len(messages) == 1
-    assert "Make Single User" in messages[0]
-    tool.delta_rotation_quaternion = (0.5, 0.5, 0.5, 0.5)
-    bpy.context.view_layer.update()
-    assert notes_on(tool) == notes_on(other) == ([], "dq_sclerp")
-
-
 PLAIN = SegmentFacts(
     first=1.0,
     last=20.0,
