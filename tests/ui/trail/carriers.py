@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
@@ -21,49 +21,35 @@ MOVE, TURN = Matrix.Translation((0.3, -0.5, 0.8)), Quaternion((0.3, -0.5, 0.8), 
 MIDDLE = FRAMES[1]
 
 
-def new_tool(order: str) -> Callable[[], Carrier]:
-    return lambda: key(new_object(rotation_mode=order))
+BONES: dict[str, dict[str, object]] = {
+    "bone": {},
+    "free of its rest": {"use_local_location": False},
+    "not turned along": {"use_inherit_rotation": False},
+    "not scaled along": {"inherit_scale": "NONE"},
+}
+KINDS = ("QUATERNION", "XYZ", "AXIS_ANGLE", "with deltas", "parented", "scaled", "hung", *BONES)
 
 
-def with_deltas() -> Carrier:
-    obj = key(new_object(rotation_mode="XZY"))
-    give_own_deltas(obj)
-    return obj
-
-
-def on_parent(kind: str) -> Callable[[], Carrier]:
-    """Return a maker of props: on a moving table, on one that is scaled, too, or on a moving bone."""
-
-    def make() -> Carrier:
+def carrier_of(kind: str) -> Carrier:
+    """Return a keyed object with this rotation mode or with deltas, a prop on a moving parent, or a hand."""
+    if kind in BONES:
+        return new_hand(**BONES[kind])
+    if kind in ("parented", "scaled", "hung"):
         prop = new_prop(kind)
         wander(prop, 6, FRAMES)
         return prop
-
-    return make
-
-
-def bone(**settings: object) -> Callable[[], Carrier]:
-    """Return a maker of hands below moving bones."""
-
-    def make() -> Carrier:
-        rig = new_rig(**settings)
-        for name in ("Hip", "Arm"):
-            set_mode(key_bone(rig.pose.bones[name]), "dq_sclerp")
-        return key(rig.pose.bones["Hand"], seed=1743)
-
-    return make
+    obj = key(new_object(rotation_mode="XZY" if kind == "with deltas" else kind))
+    if kind == "with deltas":
+        give_own_deltas(obj)
+    return obj
 
 
-CARRIERS: dict[str, Callable[[], Carrier]] = {
-    **{order: new_tool(order) for order in ("QUATERNION", "XYZ", "AXIS_ANGLE")},
-    "with deltas": with_deltas,
-    **{kind: on_parent(kind) for kind in ("parented", "scaled", "hung")},
-    "bone": bone(),
-    **{
-        f"{name}={value}": bone(**{name: value})
-        for name, value in (("use_local_location", False), ("use_inherit_rotation", False), ("inherit_scale", "NONE"))
-    },
-}
+def new_hand(**settings: object) -> bpy.types.PoseBone:
+    """Return a keyed hand below moving bones."""
+    rig = new_rig(**settings)
+    for name in ("Hip", "Arm"):
+        set_mode(key_bone(rig.pose.bones[name]), "dq_sclerp")
+    return key(rig.pose.bones["Hand"], seed=1743)
 
 
 def choose(carrier: Carrier, *frames: float) -> Carrier:

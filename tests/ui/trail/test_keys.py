@@ -22,14 +22,14 @@ from tests.animation.keyed import Carrier, curves_of, snapshot
 from tests.animation.layered import key_offset
 from tests.animation.scenes import FRAMES, key, new_object
 from tests.ui.conftest import select_keys
-from tests.ui.trail.carriers import CARRIERS, MIDDLE, MOVE, TURN, about, bone, choose, held_prop
+from tests.ui.trail.carriers import KINDS, MIDDLE, MOVE, TURN, about, carrier_of, choose, held_prop, new_hand
 
 operators = bpy.ops.rigid_motion
 
 
 @pytest.mark.parametrize(("by", "expected"), [(500.0, FRAMES[2] - 1.0), (-500.0, FRAMES[0] + 1.0)])
 def test_a_retimed_key_has_the_same_pose_and_stops_at_its_neighbours(scene, by, expected):
-    carrier = choose(CARRIERS["QUATERNION"](), MIDDLE)
+    carrier = choose(carrier_of("QUATERNION"), MIDDLE)
     before = worlds(carrier, [MIDDLE])
     operators.retime_path_keys(frames=by)
     assert worlds(carrier, [expected]) == pytest.approx(before, abs=1e-5)
@@ -37,7 +37,7 @@ def test_a_retimed_key_has_the_same_pose_and_stops_at_its_neighbours(scene, by, 
 
 
 def test_what_is_tried_first_has_no_say_in_what_comes_next(scene):
-    carrier = choose(CARRIERS["bone"](), MIDDLE)
+    carrier = choose(carrier_of("bone"), MIDDLE)
     edits = KeyEdits(selected_spaces(handles_of(bpy.context), leave_carried=True))
     before = snapshot(carrier)
     assert [edits.retime(by) for by in (4.0, 5.0, -3.0)] == [4.0, 5.0, -3.0]
@@ -49,7 +49,7 @@ def test_what_is_tried_first_has_no_say_in_what_comes_next(scene):
 
 
 def test_a_key_is_inserted_and_selected_on_the_motion_and_none_on_another(scene):
-    carrier, frames = choose(CARRIERS["QUATERNION"]()), np.arange(FRAMES[0], FRAMES[-1] + 1.0)
+    carrier, frames = choose(carrier_of("QUATERNION")), np.arange(FRAMES[0], FRAMES[-1] + 1.0)
     motion = worlds(carrier, frames)
     assert operators.insert_path_key(frame=17.0) == {"FINISHED"}
     assert key_frames(carrier).tolist() == sorted((*FRAMES, 17.0))
@@ -61,7 +61,7 @@ def test_a_key_is_inserted_and_selected_on_the_motion_and_none_on_another(scene)
 
 
 def test_selected_keys_and_all_keys_may_be_deleted(scene):
-    carrier = choose(CARRIERS["QUATERNION"](), *FRAMES[1:3])
+    carrier = choose(carrier_of("QUATERNION"), *FRAMES[1:3])
     set_mode(carrier, "motor_spline")
     operators.delete_path_keys()
     assert key_frames(carrier).tolist() == [FRAMES[0], FRAMES[-1]]
@@ -71,7 +71,7 @@ def test_selected_keys_and_all_keys_may_be_deleted(scene):
 
 
 def test_all_keys_are_selected_and_none(scene):
-    carrier = choose(CARRIERS["bone"]())
+    carrier = choose(carrier_of("bone"))
     assert operators.select_all_path_keys() == {"FINISHED"}
     assert key_frames(carrier, selected=True).tolist() == list(FRAMES)
     operators.select_all_path_keys(deselect=True)
@@ -79,7 +79,7 @@ def test_all_keys_are_selected_and_none(scene):
 
 
 def test_what_has_no_keys_of_its_place_is_refused_and_the_rest_is_done(scene):
-    own, grown = CARRIERS["QUATERNION"](), new_object("Balloon")
+    own, grown = carrier_of("QUATERNION"), new_object("Balloon")
     write_channel(grown, "scale", np.array(FRAMES), np.outer(FRAMES, np.ones(3)))
     choose(grown, MIDDLE)
     assert operators.move_path_keys(value=(1.0, 0.0, 0.0)) == {"CANCELLED"}
@@ -115,11 +115,11 @@ def assert_edited(carrier: Carrier, edit: Callable[[], set[str]], frames: Sequen
 
 
 @pytest.mark.parametrize(
-    ("kind", "how"), in_turn(CARRIERS, tuple(product(("BLENDER", "dq_sclerp", "motor_spline"), EDITS)))
+    ("kind", "how"), in_turn(KINDS, tuple(product(("BLENDER", "dq_sclerp", "motor_spline"), EDITS)))
 )
 def test_a_key_goes_where_it_is_moved_to_and_the_others_stay(scene, kind, how):
     mode, edit = how
-    carrier = choose(CARRIERS[kind](), MIDDLE)
+    carrier = choose(carrier_of(kind), MIDDLE)
     set_mode(carrier, mode)
     others = [frame for frame in FRAMES if frame != MIDDLE]
     stay = worlds(carrier, others)
@@ -130,7 +130,7 @@ def test_a_key_goes_where_it_is_moved_to_and_the_others_stay(scene, kind, how):
 
 @pytest.mark.parametrize(("kind", "edit"), [("XYZ", turned), ("parented", moved), ("bone", turned)])
 def test_a_key_of_a_layer_goes_where_it_is_moved_to_whatever_the_base_does(scene, kind, edit):
-    carrier = CARRIERS[kind]()
+    carrier = carrier_of(kind)
     add_layer(carrier)
     key_offset(carrier, frames=FRAMES)
     bpy.context.view_layer.update()
@@ -139,7 +139,7 @@ def test_a_key_of_a_layer_goes_where_it_is_moved_to_whatever_the_base_does(scene
 
 @pytest.mark.parametrize("kind", ["XYZ", "parented", "bone"])
 def test_several_keys_turn_about_their_middle(scene, kind):
-    assert_edited(choose(CARRIERS[kind](), *FRAMES), turned, FRAMES)
+    assert_edited(choose(carrier_of(kind), *FRAMES), turned, FRAMES)
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ def test_keys_of_what_is_held_go_where_they_are_moved_to(scene, frame, how):
 
 
 def test_a_bone_that_only_turns_points_where_its_tail_is_dragged(scene):
-    hand = bone(use_connect=True)()
+    hand = new_hand(use_connect=True)
     for index in range(3):
         curves_of(hand)  # read again: removing one moves the others
         fcurves = hand.id_data.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
@@ -167,7 +167,7 @@ def test_a_bone_that_only_turns_points_where_its_tail_is_dragged(scene):
 
 
 def test_nothing_is_done_without_selected_keys_or_paths(scene):
-    carrier = choose(CARRIERS["QUATERNION"]())
+    carrier = choose(carrier_of("QUATERNION"))
     before = snapshot(carrier)
     assert moved() == {"CANCELLED"}
     scene.rigid_motion_overlay.show_paths = False
@@ -183,7 +183,7 @@ POINT = np.array((0.3, -0.2, 0.9, 1.0))
     [("QUATERNION", "BLENDER"), ("with deltas", "motor_spline"), ("scaled", "BLENDER"), ("bone", "motor_spline")],
 )
 def test_the_path_is_that_of_the_point_that_leads_and_bodies_turn_about_it(scene, kind, mode):
-    carrier = choose(CARRIERS[kind](), MIDDLE)
+    carrier = choose(carrier_of(kind), MIDDLE)
     set_mode(carrier, mode)
     scene.frame_set(17)
     (now,) = worlds(carrier, [17.0])
@@ -219,7 +219,7 @@ def test_vertices_and_the_tail_lead(scene):
     assert sword.rigid_motion.lead[:] == pytest.approx((0.1, 0.0, 2.0))
     operators.set_path_point(point="ORIGIN")
     assert sword.rigid_motion.lead[:] == (0.0, 0.0, 0.0)
-    hand = choose(bone()())
+    hand = choose(new_hand())
     operators.set_path_point(point="TAIL")
     assert hand.rigid_motion.lead[:] == pytest.approx((0.0, hand.length, 0.0))
 
@@ -234,7 +234,7 @@ def test_vertices_and_the_tail_lead(scene):
     ],
 )
 def test_what_has_no_key_of_its_own_there_goes_along(scene, part, mode, edit):
-    carrier = CARRIERS["XYZ"]()
+    carrier = carrier_of("XYZ")
     for (path, _), fcurve in curves_of(carrier).items():
         if path == part:
             fcurve.keyframe_points.remove(fcurve.keyframe_points[1])
@@ -265,7 +265,7 @@ def proportional(scene):
 )
 def test_keys_around_follow_the_less_the_more_frames_they_are_away(proportional, kind, how):
     mode, edit = how
-    carrier = choose(CARRIERS[kind](), MIDDLE)
+    carrier = choose(carrier_of(kind), MIDDLE)
     set_mode(carrier, mode)
     before = worlds(carrier, FRAMES)
     edit()
@@ -278,7 +278,7 @@ def test_keys_around_follow_the_less_the_more_frames_they_are_away(proportional,
 
 
 def test_keys_that_what_carries_them_takes_along_do_not_follow_twice(proportional):
-    prop = choose(CARRIERS["parented"](), MIDDLE)
+    prop = choose(carrier_of("parented"), MIDDLE)
     table = prop.parent
     table.animation_data_clear()
     select_keys(key(table), MIDDLE)
@@ -294,6 +294,6 @@ def test_keys_that_what_carries_them_takes_along_do_not_follow_twice(proportiona
 
 
 def test_keys_in_time_do_not_follow(proportional):
-    carrier = choose(CARRIERS["QUATERNION"](), MIDDLE)
+    carrier = choose(carrier_of("QUATERNION"), MIDDLE)
     operators.retime_path_keys(frames=2.0)
     assert key_frames(carrier).tolist() == [FRAMES[0], MIDDLE + 2.0, *FRAMES[2:]]

@@ -18,7 +18,7 @@ from tests.animation.bones.rigs import in_turn
 from tests.animation.held import worlds
 from tests.animation.keyed import Carrier, curves_of, snapshot
 from tests.animation.scenes import FRAMES, new_object, write
-from tests.ui.trail.carriers import CARRIERS, MIDDLE, choose
+from tests.ui.trail.carriers import MIDDLE, carrier_of, choose
 
 pytestmark = pytest.mark.any_blender
 
@@ -74,7 +74,7 @@ MODES = ("motor_spline", "dq_sclerp", "lerp_slerp")
 )
 def test_the_path_stays_and_so_does_all_else(scene, kind, how):
     mode, after = how
-    carrier = choose(CARRIERS[kind](), MIDDLE)
+    carrier = choose(carrier_of(kind), MIDDLE)
     stop_parents(carrier)
     set_mode(carrier, mode)
     path, others = worlds(carrier, np.linspace(*SIDES[after], 1500)), worlds(carrier, outside(SIDES[after]))
