@@ -17,6 +17,7 @@ from examples.lid import make as lid
 from examples.sword import make as sword
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion_batch.recordings.clip_reading import read_clips
+from tests.animation.keyed import curves_of
 from tests.scripts.comparing import outputs
 
 EXAMPLES = Path(make_examples.__file__).parent
@@ -68,9 +69,7 @@ def matrix(depsgraph: bpy.types.Depsgraph, name: str) -> object:
 
 def keys_of(name: str) -> int:
     """Return the number of frames on which an object has location keys."""
-    moved = bpy.data.objects[name].animation_data
-    curve = moved.action.layers[0].strips[0].channelbag(moved.action_slot).fcurves.find("location")
-    return len(curve.keyframe_points)
+    return len(curves_of(bpy.data.objects[name])["location", 0].keyframe_points)
 
 
 @pytest.mark.parametrize("name", make_examples.NAMES)

@@ -10,18 +10,10 @@ from mathutils import Vector
 
 from assets import make_listing
 from research.making import listing
-from rigid_motion import animation
 
 LISTING = make_listing.ASSETS / "listing"
 
 HAND = Vector((1.0, 2.0, 3.0))
-
-
-@pytest.fixture
-def followed(empty_file):
-    animation.register()
-    yield
-    animation.unregister()
 
 
 def grips(mode: str | None) -> np.ndarray:
@@ -31,7 +23,7 @@ def grips(mode: str | None) -> np.ndarray:
     return np.array([pose @ listing.GRIP - HAND for pose in listing.swing(hammer, HAND, mode)]) / listing.HANDLE_LENGTH
 
 
-def test_by_the_screw_the_grip_stays_in_the_hand_which_it_leaves_by_blenders_own_in_betweens(followed):
+def test_by_the_screw_the_grip_stays_in_the_hand_which_it_leaves_by_blenders_own_in_betweens(extension):
     assert np.linalg.norm(grips(None), axis=1).max() > 0.4
     assert np.linalg.norm(grips("dq_sclerp"), axis=1).max() < 1e-5
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import math
-
 import bpy
 import numpy as np
+from mathutils import Quaternion
 
 from tests.animation.bones.rigs import Rest, new_rig
+from tests.animation.held import put
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 
 FRAMES = (1, 20, 40)
+AXIS = (0.6, 0.0, 0.8)
 
 
 def extension() -> bpy.types.Addon:
@@ -28,7 +29,7 @@ def key_the_cube() -> None:
     obj = cube()
     obj.rotation_mode = "QUATERNION"
     for frame, location, angle in zip(FRAMES, ((-3, 0, 0), (0, 1, 1), (3, -1, 0)), (0, 1.8, 3.0), strict=True):
-        _key(obj, frame, location, angle)
+        put(obj, frame, location, Quaternion(AXIS, angle))
     bpy.context.scene.frame_set(10)
     bpy.ops.ed.undo_push(message="Keys")
 
@@ -59,15 +60,9 @@ def make_the_rig() -> None:
     obj = new_rig("Rig", (Rest("Arm", (0, 0, 0), (0, 0.2, 1.5)), Rest("Hand", (0, 0.3, 1.7), (0.4, 0.3, 2.6), "Arm")))
     for number, bone in enumerate(obj.pose.bones):
         for frame, x, angle in zip(FRAMES, (-1, 0, 1), (0, 1.6, 3.0), strict=True):
-            _key(bone, frame, (x, 0.3 * number * x, 0.4 * abs(x)), angle * (0.5 + number) / 1.5)
+            turn = Quaternion(AXIS, angle * (0.5 + number) / 1.5)
+            put(bone, frame, (x, 0.3 * number * x, 0.4 * abs(x)), turn)
     bpy.context.scene.frame_set(10)
-
-
-def _key(carrier: bpy.types.Object | bpy.types.PoseBone, frame: int, location: tuple, angle: float) -> None:
-    carrier.location = location
-    carrier.rotation_quaternion = (math.cos(angle / 2), 0.6 * math.sin(angle / 2), 0, 0.8 * math.sin(angle / 2))
-    carrier.keyframe_insert("location", frame=frame)
-    carrier.keyframe_insert("rotation_quaternion", frame=frame)
 
 
 def pose_the_rig(hand: Hand) -> Steps[bpy.types.Area]:

@@ -1,4 +1,4 @@
-"""Online manual: F1 on operators and properties, and buttons in the preferences, open the right page."""
+"""Descriptions, and the manual: F1 on operators and properties, and buttons in the preferences, open the right page."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from bl_operators.wm import WM_OT_doc_view_manual, _wm_doc_get_id
 
 from rigid_motion.animation.properties import RigidMotion
-from rigid_motion.ui import CLASSES, manual
+from rigid_motion.ui import CLASSES, gltf_export, live, manual
 from rigid_motion.ui.overlay.settings import RigidMotionOverlay
 from rigid_motion.ui.preferences import RigidMotionPreferences
 from tests.test_glossary import anchors
@@ -23,9 +23,21 @@ def page(doc_id: str) -> str | None:
     return WM_OT_doc_view_manual._lookup_rna_url(_wm_doc_get_id(doc_id, do_url=False), verbose=False)
 
 
-def test_every_operator_has_a_page(extension):
-    for cls in CLASSES:
-        assert not issubclass(cls, bpy.types.Operator) or page(cls.bl_idname).startswith(manual.DOCS), cls
+def test_every_operator_and_its_properties_say_what_they_are_for_and_it_has_a_page(extension):
+    for operator in (cls for cls in CLASSES if issubclass(cls, bpy.types.Operator)):
+        assert page(operator.bl_idname).startswith(manual.DOCS), operator
+        assert operator.bl_idname.startswith("rigid_motion.")
+        assert operator.bl_description, operator
+        assert not operator.bl_description.endswith("."), operator
+        # Exports and ports change nothing that could be undone.
+        without_undo = operator.__module__ in (gltf_export.__name__, live.__name__)
+        assert {"REGISTER", "UNDO"} - operator.bl_options <= ({"UNDO"} if without_undo else set()), operator
+        kind = getattr(bpy.ops.rigid_motion, operator.bl_idname.partition(".")[2]).get_rna_type()
+        for prop in kind.properties:
+            if prop.identifier != "rna_type":
+                assert prop.name, (operator, prop.identifier)
+                assert prop.description, (operator, prop.identifier)
+                assert all(item.description for item in getattr(prop, "enum_items", ())), prop.identifier
 
 
 @pytest.mark.parametrize(

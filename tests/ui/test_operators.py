@@ -13,7 +13,6 @@ from rigid_motion.animation import (
 )
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.animation.transforms.sizes import first_tolerance
-from rigid_motion.ui import CLASSES, gltf_export, live
 from rigid_motion.ui.operators import axis_of_turns
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import editor, new_object
@@ -183,19 +182,3 @@ def test_a_breakdown_is_keyed_by_its_factor(tool):
 def test_the_tolerance_to_begin_with_is_a_millimetre_in_any_unit(tool):
     bpy.context.scene.unit_settings.scale_length = 0.01
     assert first_tolerance(bpy.context.scene, [transform_of(tool)]) == pytest.approx(0.1)
-
-
-def test_every_operator_and_property_says_what_it_is_for(extension):
-    for operator in (cls for cls in CLASSES if issubclass(cls, bpy.types.Operator)):
-        assert operator.bl_idname.startswith("rigid_motion.")
-        assert operator.bl_description, operator
-        assert not operator.bl_description.endswith("."), operator
-        # Exports and ports change nothing that could be undone.
-        without_undo = operator.__module__ in (gltf_export.__name__, live.__name__)
-        assert {"REGISTER", "UNDO"} - operator.bl_options <= ({"UNDO"} if without_undo else set()), operator
-        kind = getattr(bpy.ops.rigid_motion, operator.bl_idname.partition(".")[2]).get_rna_type()
-        for prop in kind.properties:
-            if prop.identifier != "rna_type":
-                assert prop.name, (operator, prop.identifier)
-                assert prop.description, (operator, prop.identifier)
-                assert all(item.description for item in getattr(prop, "enum_items", ())), prop.identifier

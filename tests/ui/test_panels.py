@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import Reduction, bake, hold_in, pass_frames, set_enabled, set_mode, unbake, write_channel
-from rigid_motion.animation.queries.segments import SegmentFacts
 from rigid_motion.ui import notes
 from rigid_motion.ui.notes import cautions, facts_and_notes
 from rigid_motion.ui.wording import reduction_summary, wrapped
@@ -102,19 +101,11 @@ def test_where_modifiers_are_many_their_number_is_noted(extension):
     assert int(texts[-1].partition(" modifiers on a channel")[0]) > notes.MANY_MODIFIERS
 
 
-PLAIN = SegmentFacts(
-    first=1.0,
-    last=20.0,
-    key=1.0,
-    mode="dq_sclerp",
-    turn=radians(90.0),
-    turns=0,
-    distance=2.0,
-    long_way=False,
-    is_sure=False,
-    two_axes=False,
-    scales_unevenly=False,
-)
+@pytest.fixture
+def plain(tool):
+    """A segment of a quarter turn, of which there is nothing to say."""
+    set_mode(tool, "dq_sclerp")
+    return facts_and_notes(tool, 15.0)[0]
 
 
 @pytest.mark.parametrize(
@@ -126,16 +117,16 @@ PLAIN = SegmentFacts(
         ({"scales_unevenly": True}, "scale is not uniform"),
     ],
 )
-def test_what_one_may_not_expect_is_said_but_not_of_blenders_own(facts, words):
-    (caution,) = cautions(replace(PLAIN, **facts))
+def test_what_one_may_not_expect_is_said_but_not_of_blenders_own(plain, facts, words):
+    (caution,) = cautions(replace(plain, **facts))
     assert words in caution
-    assert cautions(replace(PLAIN, mode="BLENDER", **facts)) == []
+    assert cautions(replace(plain, mode="BLENDER", **facts)) == []
 
 
-def test_angles_and_turns_leave_no_doubt_which_way_round():
-    assert cautions(replace(PLAIN, turn=radians(178.0), is_sure=True)) == []
-    assert cautions(replace(PLAIN, turn=radians(898.0), turns=2)) == []
-    assert cautions(replace(PLAIN, turns=-1, long_way=True)) == []
+def test_angles_and_turns_leave_no_doubt_which_way_round(plain):
+    assert cautions(replace(plain, turn=radians(178.0), is_sure=True)) == []
+    assert cautions(replace(plain, turn=radians(898.0), turns=2)) == []
+    assert cautions(replace(plain, turns=-1, long_way=True)) == []
 
 
 def test_lines_are_as_full_as_they_fit_and_lose_no_word():

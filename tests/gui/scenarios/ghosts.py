@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from tests.animation.bones.rigs import pose_mode
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.keyed import cube, key_the_cube
@@ -52,12 +53,7 @@ def scenario(hand: Hand) -> Steps[None]:
     space.view_location, space.view_distance = (0.0, 0.0, 0.9), 5.0
     bpy.ops.rigid_motion.reduce_keys(by="NUMBER", count=8, mode="motor_spline")
     bpy.context.scene.frame_end = int(FRAMES[-1])
-    yield from hand.hover(places.centre(places.region(view)))
-    yield from hand.press("TAB", ctrl=True)
-    assert bpy.context.mode == "POSE", bpy.context.mode
-    for bone in rig.pose.bones:
-        bone.select = bone.name in ("Hand.L", "Hand.R")
-    rig.data.bones.active = rig.data.bones["Hand.L"]
+    pose_mode(rig, "Hand.L", "Hand.R")
     bpy.context.scene.frame_set(60)
     without = yield from tinted(hand, view, "bones-without")
     settings.show_ghosts, settings.ghost_step = True, 6

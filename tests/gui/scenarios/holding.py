@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from rigid_motion.animation import hold_facts
+from tests.animation.bones.rigs import select_bones
 from tests.gui import places
 from tests.gui.driver import FOLDED_PANEL, Hand, Steps
 from tests.gui.keyed import on_screen, pose_the_rig, rig
@@ -49,9 +50,7 @@ def at(frame: int, bone: str) -> Steps[None]:
     """Go to a frame, and select the mug and then a bone."""
     bpy.context.scene.frame_set(frame)
     mug().select_set(True)
-    for item in rig().pose.bones:
-        item.select = item.name == bone
-    rig().data.bones.active = rig().data.bones[bone]
+    select_bones(rig(), bone)
     bpy.ops.ed.undo_push(message="Select")
     yield
 

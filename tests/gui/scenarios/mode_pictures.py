@@ -14,6 +14,7 @@ from mathutils import Euler, Matrix, Quaternion, Vector
 
 from examples import figure
 from tests.animation.bones.rigs import select_only
+from tests.animation.held import put
 from tests.animation.keyed import curves_of
 from tests.animation.oracle import shown_worlds
 from tests.gui import places
@@ -90,7 +91,7 @@ def lid(view: bpy.types.Area) -> float:
     cover = body("Lid", WOOD, ((0, 0, 0), (1.2, 0.7, 0.1)), ((0.62, 0, 0), (0.05, 0.12, 0.1)))
     for frame, angle in ((1, 0.0), (25, -110.0)):
         turn = Quaternion((0, 1, 0), math.radians(angle))
-        key(cover, frame, turn @ Vector((0.6, 0, 0.05)), turn)
+        put(cover, frame, turn @ Vector((0.6, 0, 0.05)), turn)
     native = shown(cover)
     choose(cover, SCREW)
     ghosts(cover, native, NATIVE, (13,))
@@ -108,7 +109,7 @@ def hammer(view: bpy.types.Area) -> float:
     tool = body("Hammer", WOOD, ((0, 0, -0.5), (0.07, 0.07, 1.1)), ((0, 0, 0.02), (0.4, 0.16, 0.17)))
     for frame, angle in ((1, -70.0), (25, 65.0)):
         turn = Quaternion((0, 1, 0), math.radians(angle))
-        key(tool, frame, wrist - turn @ grip, turn)
+        put(tool, frame, wrist - turn @ grip, turn)
     choose(tool, STRAIGHT)
     straight = shown(tool)
     choose(tool, SCREW)
@@ -127,7 +128,7 @@ def throw(view: bpy.types.Area) -> float:
     sticks = [body(name, METAL, ((0, 0, 0), (0.9, 0.08, 0.08)), ((0.4, 0, 0), (0.16, 0.12, 0.12))) for name in "AB"]
     for stick, mode in zip(sticks, (STRAIGHT, SCREW), strict=True):
         for frame, x, angle in ((1, -1.6, 0.0), (25, 1.6, 150.0)):
-            key(stick, frame, (x, 0, 0.3), Quaternion((0, 1, 0), math.radians(angle)))
+            put(stick, frame, (x, 0, 0.3), Quaternion((0, 1, 0), math.radians(angle)))
         choose(stick, mode)
         color = MODE if mode == STRAIGHT else NATIVE
         ghosts(stick, shown(stick), color, (1, 7, 13, 19, 25))
@@ -149,7 +150,7 @@ def flight(view: bpy.types.Area) -> float:
             (24, (x + 0.3, -0.35, 0), 0),
             (36, (x + 0.95, 0.5, 0), 45),
         ):
-            key(dart, frame, place, Quaternion((0, 0, 1), math.radians(heading)))
+            put(dart, frame, place, Quaternion((0, 0, 1), math.radians(heading)))
         run_evenly(dart)
         choose(dart, mode)
         ghosts(dart, shown(dart), MODE, range(4, 37, 3))
@@ -184,13 +185,6 @@ def add(name: str, data: bpy.types.ID, color: Sequence[float]) -> bpy.types.Obje
     obj.color = color
     bpy.context.scene.collection.objects.link(obj)
     return obj
-
-
-def key(obj: bpy.types.Object, frame: int, location: Sequence[float], rotation: Quaternion) -> None:
-    """Key a pose."""
-    obj.location, obj.rotation_quaternion = location, rotation
-    for path in ("location", "rotation_quaternion"):
-        obj.keyframe_insert(path, frame=frame)
 
 
 def run_evenly(obj: bpy.types.Object) -> None:

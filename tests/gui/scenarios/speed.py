@@ -8,6 +8,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from tests.animation.keyed import key_frames
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.keyed import FRAMES, cube, key_the_cube
@@ -22,9 +23,7 @@ def rows_of(pixels: np.ndarray, color: tuple[float, float, float]) -> np.ndarray
 
 
 def frames() -> list[float]:
-    return sorted(
-        {key.co.x for key in cube().animation_data.action.layers[0].strips[0].channelbags[0].fcurves[0].keyframe_points}
-    )
+    return key_frames(cube()).tolist()
 
 
 def scenario(hand: Hand) -> Steps[None]:
