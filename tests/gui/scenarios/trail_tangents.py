@@ -9,6 +9,7 @@ from mathutils import Quaternion, Vector
 from rigid_motion.animation import key_frames
 from tests.animation.held import put
 from tests.animation.keyed import snapshot
+from tests.animation.oracle import shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.keyed import FRAMES, cube
@@ -48,14 +49,9 @@ def key_an_arc() -> None:
 
 def velocity(side: int) -> Vector:
     """Return the velocity after (1) or before (-1) the middle key, in units per second, pointing away from the key."""
-    scene = bpy.context.scene
-    ends = []
-    for frame in (MIDDLE, MIDDLE + side * INSTANT):
-        scene.frame_set(int(frame // 1), subframe=frame % 1)
-        cube().evaluated_get(bpy.context.evaluated_depsgraph_get())
-        ends.append(cube().evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation.copy())
-    scene.frame_set(FRAMES[0])
-    return (ends[1] - ends[0]) / INSTANT * scene.render.fps
+    here, beside = shown_worlds([cube()], (MIDDLE, MIDDLE + side * INSTANT))[0][:, :3, 3]
+    bpy.context.scene.frame_set(FRAMES[0])
+    return Vector(beside - here) / INSTANT * bpy.context.scene.render.fps
 
 
 def handle(view: bpy.types.Area, side: int) -> Place:
