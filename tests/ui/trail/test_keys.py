@@ -60,6 +60,14 @@ def test_a_key_is_inserted_and_selected_on_the_motion_and_none_on_another(scene)
     assert snapshot(carrier) == before
 
 
+@pytest.mark.parametrize("frame", [24.0, 50.0, 75.0])
+def test_the_motion_of_what_is_held_stays_where_a_key_is_inserted(scene, frame):
+    prop = held_prop("free")
+    before = worlds(prop)
+    assert operators.insert_path_key(frame=frame) == {"FINISHED"}
+    assert worlds(prop) == pytest.approx(before, abs=2e-5)
+
+
 def test_selected_keys_and_all_keys_may_be_deleted(scene):
     carrier = choose(carrier_of("QUATERNION"), *FRAMES[1:3])
     set_mode(carrier, "motor_spline")
@@ -250,10 +258,7 @@ def test_what_has_no_key_of_its_own_there_goes_along(scene, part, mode, edit):
 def proportional(scene):
     """Proportional Editing over 20 frames."""
     tools = scene.tool_settings
-    before = tools.use_proportional_action, tools.proportional_size, tools.proportional_edit_falloff
     tools.use_proportional_action, tools.proportional_size, tools.proportional_edit_falloff = True, 20.0, "LINEAR"
-    yield tools
-    tools.use_proportional_action, tools.proportional_size, tools.proportional_edit_falloff = before
 
 
 @pytest.mark.parametrize(
