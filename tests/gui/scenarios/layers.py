@@ -26,8 +26,9 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.search("Add Layer")
     assert cube().parent.name == "Cube Base"
+    bpy.context.scene.frame_set(20)
     before = on_screen("Cube")
-    yield from keyed_by_hand(hand, view, 20)
+    yield from keyed_by_hand(hand, view)
     assert np.abs(on_screen("Cube") - before).max() > 0.3, "it was moved"
     yield from hand.picture("cube", places.box(places.region(view)))
     layered = on_screen("Cube")
@@ -41,9 +42,8 @@ def scenario(hand: Hand) -> Steps[None]:
     assert cube().parent is None
 
 
-def keyed_by_hand(hand: Hand, view: bpy.types.Area, frame: int) -> Steps[None]:
-    """Move the selected object upwards on a frame, rotate it, and key both."""
-    bpy.context.scene.frame_set(frame)
+def keyed_by_hand(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """Move the selected object upwards, rotate it, and key both."""
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.press("G")
     yield from hand.press("Z")
