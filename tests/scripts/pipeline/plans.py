@@ -7,14 +7,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor
+from rigid_motion_batch.pipeline.executors import Executor
 from rigid_motion_batch.pipeline.running import Plan, Run, share_of
 from rigid_motion_batch.pipeline.steps import OWN_FOLDER, Step, Task
 from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.progress import Progress, Stage
 from tests.scripts.pipeline.steps import FILE, Join, Write
-
-EXECUTORS = {"serial": Executor, "processes": lambda: ProcessExecutor(2)}
 
 
 def task(name: str, step: Step, *after: Task, **fields: object) -> Task:

@@ -55,11 +55,7 @@ class Copy(Step):
 
     def make(self, job: StepJob) -> None:
         _note(self.log, "copy")
-        source = Path(*job.task.inputs)
-        try:
-            (job.folder / FILE).write_text(source.read_text())
-        except FileNotFoundError:
-            raise TaskError(f"{source}: no such file") from None
+        (job.folder / FILE).write_text(Path(*job.task.inputs).read_text())
 
 
 class Vanish(Copy):
@@ -71,15 +67,18 @@ class Vanish(Copy):
 
 
 class Fail(Step):
-    """Writes half, and fails."""
+    """Writes half, and fails: as foreseen, by an unforeseen error, or as on a full disk."""
 
-    foreseen: bool = True
+    why: str = "foreseen"
 
     def make(self, job: StepJob) -> None:
         (job.folder / FILE).write_text("half")
-        if self.foreseen:
-            raise TaskError("it cannot be made; make another")
-        raise KeyError("unforeseen")
+        match self.why:
+            case "foreseen":
+                raise TaskError("it cannot be made; make another")
+            case "full disk":
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(job.folder / FILE))
+        raise KeyError(self.why)
 
 
 class Stumble(Step):
@@ -90,13 +89,6 @@ class Stumble(Step):
     def make(self, job: StepJob) -> None:
         (job.folder / self.file).mkdir(parents=True)
         (job.folder / self.file).write_text("never")
-
-
-class Forget(Step):
-    """Makes no file."""
-
-    def make(self, job: StepJob) -> None:
-        pass
 
 
 class Die(Step):
@@ -125,13 +117,6 @@ class ProcessId(Step):
     def make(self, job: StepJob) -> None:
         time.sleep(self.seconds)
         (job.folder / FILE).write_text(str(os.getpid()))
-
-
-class FillDisk(Step):
-    """Fails as on a full disk."""
-
-    def make(self, job: StepJob) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(job.folder / FILE))
 
 
 class Chatter(Step):

@@ -13,12 +13,13 @@ import pytest
 
 from rigid_motion_batch.cli.compare import version_of
 from rigid_motion_batch.pipeline import running
-from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor
+from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from rigid_motion_batch.pipeline.running import Run
 from rigid_motion_batch.pipeline.steps import OWN_FOLDER, RunError, Task
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline.blender_steps import Save
 from tests.scripts.pipeline.plans import Listener, contents, half_written, run, states, task, writing
+from tests.scripts.stopping import alive, descendants
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -88,13 +89,6 @@ def test_a_blender_that_dies_is_started_again(blender: str, tmp_path: Path, monk
     assert contents(tmp_path / "out") == {}
 
 
-def test_without_a_program_the_step_is_done_here(tmp_path: Path) -> None:
-    with Store(tmp_path) as store, Executor() as executor:
-        tasks = [saving(Save("one", (1,)), store)]
-        assert states(run(lambda: tasks, store, executor)) == {"done": 1}
-    assert (tmp_path / "out.txt").read_text() == "False "
-
-
 def test_a_blender_says_which_it_is(blender: str) -> None:
     assert version_of(blender).count(".") == 2
 
@@ -113,26 +107,12 @@ def test_a_blender_ends_with_what_started_it(blender: str, tmp_path: Path) -> No
         ends = time.monotonic() + 60.0
         while not list(tmp_path.glob(f"{OWN_FOLDER}/scratch/*/*/*/begun")) and time.monotonic() < ends:
             time.sleep(0.05)
-        pids.extend(blenders())
+        pids.append(descendants(os.getpid())[-1])
         os.kill(os.getpid(), signal.SIGINT)
 
     threading.Thread(target=kill, daemon=True).start()
     assert saved(tmp_path, blender, "slow").interrupted
-    assert pids
     ends = time.monotonic() + 10.0
-    while set(blenders()) & set(pids) and time.monotonic() < ends:
+    while alive(pids[0]) and time.monotonic() < ends:
         time.sleep(0.05)
-    assert not set(blenders()) & set(pids)
-
-
-def blenders() -> list[int]:
-    """Return the ids of processes that perform a request in Blender."""
-    result = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            command = path.read_bytes()
-        except OSError:
-            continue
-        if b"perform_in_blender" in command and b"--background" in command:
-            result.append(int(path.parent.name))
-    return result
+    assert not alive(pids[0])

@@ -11,7 +11,7 @@ from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import Listener, contents, joining, run, run_in, states, task, writing
-from tests.scripts.pipeline.steps import Die
+from tests.scripts.pipeline.steps import Die, Fail
 
 needs_signals = pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
 
@@ -37,9 +37,12 @@ def test_a_worker_that_dies_is_replaced_and_its_task_done_again(output: Path, tm
 
 @needs_signals
 def test_a_task_that_kills_every_worker_is_given_up_and_the_others_go_on(output: Path, tmp_path: Path) -> None:
-    tasks = [task("b", Die(str(tmp_path / "marker"), 99, "reading\nno such bone: Hand\n\n")), writing("a")]
-    outcome = run_in(output, *tasks, executor=ProcessExecutor(1))
-    assert states(outcome) == {"failed": 1, "done": 1}
+    bad = task("bad", Fail())
+    needs_bad = joining("c", bad)
+    tasks = [task("b", Die(str(tmp_path / "marker"), 99, "reading\nno such bone: Hand\n\n")), bad, writing("a")]
+    outcome = run_in(output, *tasks, needs_bad, joining("d", needs_bad), executor=ProcessExecutor(1))
+    assert states(outcome) == {"failed": 2, "done": 1, "skipped": 2}
+    assert outcome.failures["bad"] == "it cannot be made; make another"
     died = "its process died (SIGKILL, perhaps for want of memory): no such bone: Hand"
     assert outcome.failures["b"] == f"b: {died}; given up after 3 attempts"
     assert contents(output) == {"a.txt": "a"}

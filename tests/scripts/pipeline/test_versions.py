@@ -56,8 +56,3 @@ def test_files_that_come_and_go_change_a_room(room: Path, change: str) -> None:
     else:
         template.rename(template.with_name("other.html"))
     assert in_rooms("measuring").key != before
-
-
-def test_a_room_that_does_not_exist_is_an_error() -> None:
-    with pytest.raises(FileNotFoundError):
-        digest_of(places.place_of("kitchen"))
