@@ -1,5 +1,6 @@
 """Tests of bake.py as users run it: its results, the files that it leaves alone, its messages and exit codes."""
 
+import contextlib
 import json
 import os
 import shutil
@@ -12,12 +13,12 @@ import numpy as np
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import set_mode
+from rigid_motion.animation import is_baked, set_mode
 from rigid_motion.animation.actions.marks import MAX_MARK, write_marks
 from rigid_motion_batch.keying import jobs
 from tests.animation.farm import played_on_a_farm
 from tests.animation.keyed import curves_of, snapshot
-from tests.animation.oracle import expected_worlds, shown_worlds
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
 from tests.scripts.baking import (
     LAST,
@@ -31,6 +32,7 @@ from tests.scripts.baking import (
     save,
     with_version,
 )
+from tests.scripts.recordings.blends import rig
 from tests.scripts.reducing import listed
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -38,15 +40,18 @@ ROOT = Path(__file__).resolve().parents[2]
 PLAYED = np.arange(0.0, LAST + 1.0)
 """All frames of the scenes: from before the first key until after the last NLA strip."""
 
-BAKED = ("Arm", "Axis", "Camera", "Noisy", "Own", "Strips", "Tool", "Wheel")
+BAKED = ("Arm", "Axis", "Camera", "Noisy", "Own", "Rig", "Stale", "Strips", "Tool", "Wheel")
+BAKED_BONES = ["Root", "Upper", "Hand", "Index"]
 REFUSED = {
     "Bent": "Location X has an Envelope",
+    "Claw/Bent": "Location X has an Envelope",
+    "Claw/Driven": "Location X is driven",
     "Crane": "Location X is driven: remove the driver",
     "Future": "its keys have a mode that is unknown to this version",
     "Huge": "key 2 of Location X has an invalid frame, value, handle or easing",
     "Prop": "it is linked from //library.blend: use --in-place on that file, or make it local",
 }
-"""Objects of the shot that cannot be baked, with the reasons."""
+"""Objects and bones of the shot that cannot be baked, with the reasons."""
 
 
 def fill_shot() -> None:
@@ -79,23 +84,46 @@ def fill_shot() -> None:
     set_mode(key(own, scale="even"), "pga_lerp")
     new_object("Still")
     key(new_object("Plain"), seed=6)
-    refused = {name: key(new_object(name), seed=7) for name in REFUSED if name != "Prop"}
-    for obj in refused.values():
-        set_mode(obj, "dq_sclerp", FRAMES[:2])
-    curves_of(refused["Bent"])["location", 0].modifiers.new("ENVELOPE")
-    for path in ("location", "rotation_quaternion", "scale"):
-        for item in refused["Crane"].driver_add(path):
-            item.driver.expression = "frame"
+    fill_rig()
+    claw = rig("Claw", dict.fromkeys(("Good", "Bent", "Driven"), ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), None)))
+    refused = {name: key(new_object(name), seed=7) for name in REFUSED if name in ("Bent", "Crane", "Future", "Huge")}
+    for carrier in (*refused.values(), *map(key, claw.pose.bones)):
+        set_mode(carrier, "dq_sclerp", FRAMES[:2])
+    for bent in (refused["Bent"], claw.pose.bones["Bent"]):
+        curves_of(bent)["location", 0].modifiers.new("ENVELOPE")
+    for driven, turn in ((refused["Crane"], "rotation_quaternion"), (claw.pose.bones["Driven"], "rotation_euler")):
+        for path in ("location", turn, "scale"):
+            for item in driven.driver_add(path):
+                item.driver.expression = "frame"
     for curve in curves_of(refused["Future"]).values():
         write_marks(curve, np.array([MAX_MARK, 0, 0, 0]))
     curves_of(refused["Huge"])["location", 0].keyframe_points[1].co_ui.y = 3e38
+    set_mode(key(new_object("Stale"), seed=10), "dq_sclerp")
+    animation.set_enabled(False)
+    for point in curves_of(bpy.data.objects["Stale"])["location", 0].keyframe_points:
+        point.co_ui.y *= -2.0
+
+
+def fill_rig() -> None:
+    """Add a rig, of which one finger has no mode and one bone a different mode in one segment, and an empty on it."""
+    parents = {"Root": None, "Upper": "Root", "Hand": "Upper", "Thumb": "Hand", "Index": "Hand"}
+    places = [((0.0, 0.1 * number, number), (0.0, 0.1 * number, number + 1.0)) for number in range(len(parents))]
+    own = rig("Rig", {name: (*place, parents[name]) for name, place in zip(parents, places, strict=True)})
+    for bone in own.pose.bones:
+        bone.rotation_mode = "XYZ" if bone.name == "Upper" else "QUATERNION"
+        key(bone)
+    set_mode([key(own, (5.0, 30.0)), *(own.pose.bones[name] for name in BAKED_BONES)], "dq_sclerp")
+    set_mode(own.pose.bones["Upper"], "motor_spline", FRAMES[1:2])
+    tip = new_object("Tip")
+    tip.parent, tip.parent_type, tip.parent_bone = own, "BONE", "Index"
 
 
 @pytest.fixture(scope="module")
 def shot(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A file with the objects of BAKED and REFUSED, the last of them linked, saved on frame 17."""
     folder = tmp_path_factory.mktemp("shot")
-    with extension():
+    with extension(), contextlib.ExitStack() as at_last:
+        at_last.callback(animation.set_enabled, True)
         new_file()
         set_mode(key(new_object("Prop")), "dq_sclerp")
         library = save(folder / "library.blend")
@@ -134,8 +162,8 @@ def live_worlds(path: Path, names: tuple[str, ...]) -> tuple[list[np.ndarray], l
 
 
 def test_a_baked_file_plays_in_any_blender_as_the_live_one_does_with_the_extension(shot, baked):
-    moved = (name for name in REFUSED if name != "Huge")  # "Huge" has no valid place, with or without the extension.
-    names = (*BAKED, *moved, "Still", "Plain")
+    # "Huge" has no valid place, with or without the extension. "Prop" is found from another folder.
+    names = (*BAKED, "Tip", "Bent", "Crane", "Future", "Prop", "Still", "Plain")
     opened, shown = live_worlds(shot, names)
     opened_there, shown_there, *_ = played_on_a_farm(baked, names, PLAYED)
     assert_same(opened_there, opened)
@@ -144,7 +172,7 @@ def test_a_baked_file_plays_in_any_blender_as_the_live_one_does_with_the_extensi
 
 def test_un_baking_gives_back_exactly_the_keys_and_the_motion(shot, baked, tmp_path):
     assert run(baked, "--unbake", "--output", tmp_path) == 0
-    names = (*BAKED, "Still", "Plain")
+    names = (*(name for name in BAKED if name != "Stale"), "Tip", "Still", "Plain")
     result = []
     for path in (shot, tmp_path / "shot-baked-unbaked.blend"):
         with extension():
@@ -190,9 +218,24 @@ def test_what_cannot_be_baked_is_named_with_the_way_out_and_the_others_go_on(sho
         (line,) = (line for line in lines if line.startswith(f"{shot}: {name}: not baked: "))
         assert reason in line
     assert f"{shot}: Tool: baked, frames 1 to 40, Smooth Screw, Straight, Blender" in lines
-    assert lines[-1] == f"{len(BAKED)} objects baked, {len(REFUSED)} not."
+    assert f"{shot}: Rig: {len(BAKED_BONES)} bones baked, " in said.err
+    assert lines[-1] == f"{len(BAKED)} objects and {len(BAKED_BONES) + 1} bones baked, {len(REFUSED)} not."
     assert said.out == f"{tmp_path / 'shot-baked.blend'}\n"
     assert not any("Plain" in line or "Still" in line for line in lines)
+
+
+@pytest.mark.any_blender
+@pytest.mark.parametrize(
+    ("asked", "bones", "itself"),
+    [("Rig", BAKED_BONES, True), ("Rig/*", BAKED_BONES, False), ("*/Root,Rig/?pper", ["Root", "Upper"], False)],
+)
+def test_bones_can_be_chosen_by_rig_and_by_names_and_patterns(shot, tmp_path, asked, bones, itself):
+    assert run(shot, "--objects", asked, "--output", tmp_path) == 0
+    with extension():
+        open_again(tmp_path / "shot-baked.blend")
+        own = bpy.data.objects["Rig"]
+        assert [bone.name for bone in own.pose.bones if is_baked(bone)] == bones
+        assert is_baked(own) == itself
 
 
 @pytest.mark.any_blender
@@ -232,34 +275,6 @@ def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, cap
 
 
 # Files that are left alone, and files that are kept
-
-
-def test_textures_and_libraries_are_found_from_another_folder(tmp_path):
-    (tmp_path / "shots" / "textures").mkdir(parents=True)
-    shots = tmp_path / "shots"
-    with extension():
-        new_file()
-        new_object("Prop")
-        library = save(shots / "library.blend")
-        new_file()
-        set_mode(key(new_object("Tool")), "dq_sclerp")
-        path = save(shots / "shot.blend")
-        image = bpy.data.images.new("Wood", 4, 4)
-        image.filepath_raw, image.file_format = str(shots / "textures" / "wood.png"), "PNG"
-        image.save()
-        image.filepath, image.use_fake_user = "//textures/wood.png", True
-        with bpy.data.libraries.load(str(library), link=True, relative=True) as (there, here):
-            here.objects = there.objects
-        bpy.context.scene.collection.objects.link(here.objects[0])
-        bpy.ops.wm.save_mainfile()
-    assert run(path, "--output", tmp_path / "farm" / "night") == 0
-    open_again(tmp_path / "farm" / "night" / "shot-baked.blend")
-    image, library = bpy.data.images["Wood"], bpy.data.libraries[0]
-    assert image.filepath.startswith("//")
-    assert library.filepath.startswith("//")
-    assert Path(bpy.path.abspath(image.filepath)).samefile(shots / "textures" / "wood.png")
-    assert Path(bpy.path.abspath(library.filepath)).samefile(shots / "library.blend")
-    assert not bpy.data.objects["Prop"].is_missing
 
 
 def test_no_python_of_a_file_is_run_and_all_of_it_stays(tmp_path):
@@ -327,25 +342,6 @@ def test_an_installed_extension_steps_aside_and_is_there_again_afterwards(extens
     shutil.copy(baked_name(path), tmp_path / "alone.blend")
     open_again(tmp_path / "alone.blend")
     assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
-
-
-@pytest.mark.any_blender
-def test_keys_count_as_they_are_where_live_update_was_off(tmp_path):
-    def edit(obj: bpy.types.Object) -> None:
-        animation.set_enabled(False)
-        for point in curves_of(obj)["location", 0].keyframe_points:
-            point.co_ui.y *= -2.0
-
-    try:
-        path = one_object_file(tmp_path / "shot.blend", edit)
-    finally:
-        animation.set_enabled(True)
-    with extension():
-        open_again(path)
-        expected = expected_worlds(bpy.data.objects["Tool"], PLAYED[:43])
-    assert run(path) == 0
-    open_again(baked_name(path))
-    assert_same(shown_worlds([bpy.data.objects["Tool"]], PLAYED[:43]), [expected])
 
 
 @pytest.mark.parametrize("compress", [False, True])
