@@ -25,11 +25,6 @@ def run(*arguments: object) -> int:
     return compare.main(["--jobs", "0", *map(str, arguments)])
 
 
-def shown(folder: Path) -> list[Path]:
-    """Return the contents of an output folder, without the pipeline's own folder."""
-    return sorted(path for path in folder.iterdir() if path.name != OWN_FOLDER)
-
-
 def rows_of(path: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
 

@@ -32,10 +32,6 @@ def run_without_privileges(*arguments: object) -> subprocess.CompletedProcess[st
     return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=60, preexec_fn=give_up)
 
 
-def text(path: Path) -> None:
-    path.write_text("not Blender's")
-
-
 def cut(path: Path) -> None:
     path.write_bytes(one_object_file(path).read_bytes()[:50_000])
 
@@ -47,14 +43,15 @@ def newer(path: Path) -> None:
 @pytest.mark.parametrize(
     ("make", "problem"),
     [
-        (text, "this is not a .blend file"),
+        (lambda path: path.write_text("not Blender's"), "this is not a .blend file"),
         (Path.touch, "this is not a .blend file, it is empty"),
         (cut, "Blender cannot read this file, which looks damaged"),
         (newer, "and this is"),
         (Path.mkdir, "there is nothing to be done in this folder"),
+        (os.mkfifo, "this is not a file on a disk"),
         (lambda path: None, "this cannot be opened (No such file or directory)"),
     ],
-    ids=["text", "empty", "cut off", "newer", "folder", "missing"],
+    ids=["text", "empty", "cut off", "newer", "folder", "pipe", "missing"],
 )
 def test_a_file_that_cannot_be_read_is_named_and_the_others_go_on(tmp_path, capfd, make, problem):
     bad, good = tmp_path / "bad.blend", one_object_file(tmp_path / "good.blend")
@@ -68,13 +65,6 @@ def test_a_file_that_cannot_be_read_is_named_and_the_others_go_on(tmp_path, capf
     assert said.out == f"{baked_name(good)}\n"
     assert run(bad) == 2
     assert not baked_name(bad).exists()
-
-
-@pytest.mark.any_blender
-def test_a_pipe_is_not_waited_for(tmp_path, capsys):
-    os.mkfifo(tmp_path / "pipe.blend")
-    assert run(tmp_path / "pipe.blend") == 2
-    assert "this is not a file on a disk" in capsys.readouterr().err
 
 
 @pytest.mark.any_blender
@@ -137,7 +127,18 @@ def test_a_link_is_saved_through_in_place_and_the_file_before_kept(tmp_path, cap
     assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
 
 
-# Stopped half-way
+@pytest.mark.any_blender
+def test_what_is_in_the_way_of_the_output_is_named_and_left_alone(tmp_path, capsys):
+    path = one_object_file(tmp_path / "shot.blend")
+    baked_name(path).mkdir()
+    (tmp_path / "file").touch()
+    assert run(path, "--overwrite") == 1
+    assert f"{path}: {baked_name(path)} is a folder: rename it" in capsys.readouterr().err
+    assert run(path, "--output", tmp_path / "file" / "folder") == 1
+    said = capsys.readouterr().err
+    assert f"{path}: {tmp_path / 'file'} is a file, and " in said
+    assert said.endswith("Nothing baked; 1 file failed.\n")
+    assert listed(tmp_path) == ["file", "shot-baked.blend", "shot.blend"]
 
 
 @pytest.mark.any_blender
@@ -151,23 +152,3 @@ def test_ctrl_c_while_blender_is_loaded_ends_it_at_once(tmp_path):
         [*COMMAND, path], capture_output=True, text=True, timeout=60, env=os.environ | {"PYTHONPATH": str(beside)}
     )
     assert (done.returncode, done.stdout, done.stderr) == (130, "", f"{supervising.STOPPED_TEXT}\n")
-
-
-@pytest.mark.any_blender
-def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
-    path = one_object_file(tmp_path / "shot.blend")
-    (tmp_path / "file").touch()
-    assert run(path, "--output", tmp_path / "file" / "folder") == 1
-    said = capsys.readouterr().err.splitlines()
-    assert any(line.startswith(f"{path}: {tmp_path / 'file'} is a file, and ") for line in said)
-    assert said[-1] == "Nothing baked; 1 file failed."
-    assert listed(tmp_path) == ["file", "shot.blend"]
-
-
-@pytest.mark.any_blender
-def test_a_folder_of_the_name_of_the_output_is_left_alone(tmp_path, capsys):
-    path = one_object_file(tmp_path / "shot.blend")
-    baked_name(path).mkdir()
-    assert run(path, "--overwrite") == 1
-    assert f"{path}: {baked_name(path)} is a folder: rename it" in capsys.readouterr().err
-    assert baked_name(path).is_dir()

@@ -18,6 +18,7 @@ from rigid_motion_batch.cli import compare
 from rigid_motion_batch.pipeline.steps import OWN_FOLDER
 from rigid_motion_batch.scenes import film
 from tests.balls import largest_displacements
+from tests.scripts.bvh_bodies import JOINTS, TIMES, write_body
 from tests.scripts.comparing import COLUMNS, ROOT, SMALL, outputs, poses_of, rows_of, run, table, write_toss
 
 pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
@@ -128,6 +129,22 @@ def test_all_numbers_are_in_the_report_before_the_first_frame_is_rendered(short_
     assert run(short_clip, "--output", tmp_path, "--rates", "5,10", *SMALL) == 0
     assert "films come" not in capsys.readouterr().err
     assert len(pages) == 1
+
+
+def test_the_table_has_a_row_for_every_body_choice_and_mode(short_clip, tmp_path):
+    body, modes = write_body(tmp_path / "walk.bvh", TIMES[:21]), ("lerp_slerp", "dq_sclerp")
+    options = ("--no-video", "--modes", ",".join(modes), "--rates", "5,10", "--tolerance", "1cm", "--shared")
+    assert run(body, short_clip, *options, "--output", tmp_path) == 0
+    rows = rows_of(tmp_path / "metrics.csv")
+    choices = [("5", "uniform", ""), ("10", "uniform", ""), ("", "adaptive", "0.01")]
+    assert [(row["clip"], row["rate_hz"], row["decimation"], row["tolerance_m"], row["mode"]) for row in rows] == [
+        (clip, *choice, mode) for clip in ("walk", "toss") for choice in choices for mode in modes
+    ]
+    for row in rows[:6]:
+        assert row["worst_joint"] in JOINTS
+        assert len(JOINTS) * int(row["key_frames"]) == int(row["keys"]), "as --shared asks for"
+        assert float(row["max_shell_m"]) <= 0.01 * (1.0 + 1e-9) or row["decimation"] == "uniform"
+    assert {row[name] for row in rows[6:] for name in COLUMNS.split(",")[-5:]} == {""}
 
 
 @pytest.mark.parametrize(

@@ -44,21 +44,8 @@ def mine(toss: Path) -> Path:
 @pytest.fixture(scope="module")
 def compared(toss: Path, mine: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     output = tmp_path_factory.mktemp("output")
-    assert (
-        run(
-            toss,
-            "--against",
-            mine,
-            *FAST,
-            "--output",
-            output,
-            "--tolerance",
-            "1cm",
-            "--modes",
-            "lerp_slerp,motor_spline",
-        )
-        == 0
-    )
+    options = (*FAST, "--tolerance", "1cm", "--modes", "lerp_slerp,motor_spline")
+    assert run(toss, "--against", mine, *options, "--output", output) == 0
     return output
 
 
@@ -110,12 +97,7 @@ def test_it_is_in_the_line_of_the_clip_the_table_and_the_page(toss, mine, tmp_pa
 
 @pytest.mark.parametrize(
     ("stem", "called"),
-    [
-        ("mine", "mine"),
-        ("my take (2)", "my_take_2"),
-        ("keys", "keys-2"),
-        ("lerp_slerp.keys", "lerp_slerp_keys"),
-    ],
+    [("mine", "mine"), ("my take (2)", "my_take_2"), ("keys", "keys-2"), ("lerp_slerp.keys", "lerp_slerp_keys")],
 )
 def test_it_is_called_as_its_file_but_never_as_a_table_that_is_there(stem, called):
     assert name_of_other(stem) == called

@@ -87,15 +87,9 @@ def test_a_pair_that_is_named_is_measured_and_not_found_twice(tmp_path: Path) ->
 def test_a_pair_that_is_none_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture, named: tuple[str, str], said: str
 ) -> None:
-    lines = HOLD.read_text(encoding="utf-8").splitlines()
-    later = tmp_path / "later.csv"
-    tools = [line.split(",") for line in lines[1:] if line.startswith("tool")]
-    later.write_text(
-        "\n".join(["t,x,y,z,qx,qy,qz,qw", *(",".join([f"{float(t) + 50.0:.6f}", *rest]) for _, t, *rest in tools), ""])
-    )
-    body = write_body(tmp_path / "body.bvh")
-    inputs = f"{HOLD}:*", later, body
-    assert run(*inputs, "--held", *named, *FAST, "--output", tmp_path / "output") == 2
+    later, body = tmp_path / "later.csv", write_body(tmp_path / "body.bvh")
+    later.write_text("t,x,y,z,qx,qy,qz,qw\n" + "".join(f"{50.0 + x},{x},0,0,0,0,0,1\n" for x in range(5)))
+    assert run(f"{HOLD}:*", later, body, "--held", *named, *FAST, "--output", tmp_path / "output") == 2
     error = capsys.readouterr().err
     assert f"--held {' '.join(named)}: {said}" in " ".join(error.split())
 
