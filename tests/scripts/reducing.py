@@ -4,6 +4,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rigid_motion.animation import write_channel
 from rigid_motion.motion import Poses
@@ -11,12 +12,12 @@ from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.cli import reduce
 from rigid_motion_batch.pipeline.steps import OWN_FOLDER
 from rigid_motion_batch.recordings.clips import Clip
-from tests.animation.farm import on_a_farm, played_on_a_farm
+from tests.animation.farm import played_on_a_farm
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
+from tests.balls import largest_displacements
 from tests.recordings import RECORDINGS
-from tests.scripts.baking import new_file, save
-from tests.scripts.bvh_bodies import write_body
+from tests.scripts.baking import new_file, open_again, save
 from tests.scripts.recordings.blends import rig
 
 WALK = RECORDINGS.parent / "rigs" / "pab_walk.fbx"
@@ -26,13 +27,10 @@ FRAMES = np.arange(1.0, 62.0)
 """Frames of the dense keys in the scenes."""
 
 RADIUS = 0.1
-"""Radius in metres around an origin within which errors are measured, if the object has no size of its own."""
+"""Radius in metres around an origin within which errors are measured."""
 
 ROUNDING = 2e-5
 """Allowed rounding in metres: matrices in single precision, through a chain of bones."""
-
-BALL = RADIUS * normalise(np.random.default_rng(5).normal(size=(64, 3)))
-"""Points at that distance from an origin, in all directions."""
 
 
 def run(*arguments: object) -> int:
@@ -100,10 +98,10 @@ def played(path: Path, *names: str) -> np.ndarray:
     return played_on_a_farm(path, names, FRAMES)[1]
 
 
-def displacement(worlds: np.ndarray, truth: np.ndarray, points: np.ndarray = BALL) -> float:
-    """Return the farthest that any of these points of an object is from its true place, on any frame."""
+def displacement(worlds: np.ndarray, truth: np.ndarray, radius: float = RADIUS) -> float:
+    """Return the farthest that any point within the radius of an object's origin is from its place, on any frame."""
     offset = (worlds - truth)[..., :3, :]
-    return float(np.linalg.norm(points @ offset[..., :3].swapaxes(-1, -2) + offset[..., None, :, 3], axis=-1).max())
+    return float(largest_displacements(offset[..., 3], radius * offset[..., :3]).max())
 
 
 def count_keys(carrier: bpy.types.Object | bpy.types.PoseBone) -> int:
@@ -128,16 +126,10 @@ def read_table(path: Path) -> tuple[np.ndarray, Poses]:
 
 
 def worlds_of(poses: Poses) -> np.ndarray:
-    """Return matrices (n, 4, 4) by the formula of unit quaternions, independent of this program."""
-    w, x, y, z = poses.quaternions.T
-    worlds = np.zeros((len(w), 4, 4))
-    worlds[:, 3, 3], worlds[:, :3, 3] = 1.0, poses.positions
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    worlds[:, :3, :3] = np.array(rows).transpose(2, 0, 1)
+    """Return matrices (n, 4, 4), by SciPy."""
+    worlds = np.tile(np.eye(4), (len(poses.quaternions), 1, 1))
+    worlds[:, :3, :3] = Rotation.from_quat(poses.quaternions, scalar_first=True).as_matrix()
+    worlds[:, :3, 3] = poses.positions
     return worlds
 
 
@@ -150,27 +142,10 @@ def joints_in_metres(clip: Clip) -> np.ndarray:
     return clip.metres_per_unit * np.array(result)[..., :3, 3]
 
 
-def hand_made(folder: Path) -> Path:
-    write_body(folder / "body.bvh")
-    return folder / "body.bvh"
-
-
-HEADS_AT = """
-scene = bpy.context.scene
-(rig,) = (obj for obj in bpy.data.objects if obj.type == "ARMATURE")
-rows = []
-for time in np.load(found):
-    frame = 1.0 + float(time) * scene.render.fps / scene.render.fps_base
-    scene.frame_set(int(frame // 1), subframe=frame % 1)
-    shown = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    rows.append([shown.matrix_world @ bone.head for bone in sorted(shown.pose.bones, key=lambda bone: bone.name)])
-np.save(found, np.array(rows))
-"""
-
-
 def heads_at(made: Path, times: np.ndarray) -> np.ndarray:
     """Return the heads of a reduced recording's bones at times in seconds, sorted by name, shape (bones, times, 3)."""
-    result = made.with_suffix(".npy")
-    np.save(result, times)
-    on_a_farm(HEADS_AT, made, result)
-    return np.load(result).swapaxes(0, 1)
+    open_again(made)
+    (own,) = (obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+    names, render = own.pose.bones.keys(), bpy.context.scene.render
+    shown = played_on_a_farm(made, [own.name], 1.0 + times * render.fps / render.fps_base)
+    return (shown.worlds @ shown.poses)[np.argsort(names), :, :3, 3]

@@ -10,7 +10,8 @@ import pytest
 
 from rigid_motion_batch.cli import reduce
 from tests.gltf.making import Making, walk
-from tests.scripts.reducing import hand_made, listed, object_file, run, write_csv
+from tests.scripts.bvh_bodies import write_body
+from tests.scripts.reducing import listed, object_file, run, write_csv
 from tests.scripts.stopping import ROOT, start
 
 pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
@@ -104,8 +105,8 @@ def test_what_does_not_move_is_left_alone_in_a_folder(tmp_path, capsys):
     [
         (glb, "small.glb", ()),
         (lambda path: object_file(path.with_suffix(".blend")), "small.blend", ()),
-        (lambda path: hand_made(path.parent), "small.blend", ()),
-        (lambda path: hand_made(path.parent), "small.glb", ("--glb",)),
+        (lambda path: write_body(path.with_name("body.bvh")), "small.blend", ()),
+        (lambda path: write_body(path.with_name("body.bvh")), "small.glb", ("--glb",)),
     ],
 )
 def test_the_output_of_one_input_may_be_a_file(tmp_path, make, name, options):
@@ -116,7 +117,7 @@ def test_the_output_of_one_input_may_be_a_file(tmp_path, make, name, options):
 
 @pytest.mark.parametrize(("name", "way_out"), [("a.blend", "or add --blend"), ("a.csv", "name that with --output")])
 def test_a_name_that_does_not_fit_the_recording_is_refused(tmp_path, capsys, name, way_out):
-    body, hand = hand_made(tmp_path), tmp_path / "hand.csv"
+    body, hand = write_body(tmp_path / "body.bvh"), tmp_path / "hand.csv"
     write_csv(hand)
     assert run(body if name == "a.csv" else hand, "--output", tmp_path / "new" / name) == 1
     assert way_out in capsys.readouterr().err

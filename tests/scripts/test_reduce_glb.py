@@ -10,7 +10,8 @@ from rigid_motion_batch.keying import exporting
 from rigid_motion_batch.recordings.clip_reading import read_source
 from tests.animation.farm import played_on_a_farm
 from tests.gltf.player import File, off
-from tests.scripts.reducing import FRAMES, WALK, hand_made, joints_in_metres, rig_file, run, write_csv
+from tests.scripts.bvh_bodies import write_body
+from tests.scripts.reducing import FRAMES, WALK, joints_in_metres, rig_file, run, write_csv
 
 pytestmark = pytest.mark.blender
 
@@ -57,7 +58,7 @@ def require_near_export(made: Path, exported: Path, tolerance: float, radius: fl
 
 
 def test_a_bvh_becomes_a_glb_in_metres_within_the_tolerance(tmp_path, capsys, exported):
-    body = hand_made(tmp_path)
+    body = write_body(tmp_path / "body.bvh")
     assert run(body, "--glb", "--tolerance", "5mm", "--radius", "0.03") == 0
     made = tmp_path / f"{body.stem}-reduced.glb"
     said = capsys.readouterr()

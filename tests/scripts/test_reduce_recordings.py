@@ -18,7 +18,6 @@ from tests.scripts.reducing import (
     ROUNDING,
     count_keys,
     displacement,
-    hand_made,
     heads_at,
     joints_in_metres,
     listed,
@@ -49,7 +48,7 @@ def test_the_keys_of_a_recording_tell_its_motion_within_the_tolerance(tmp_path, 
 
 @pytest.mark.any_blender
 def test_so_many_keys_of_a_recording_and_key_poses_of_a_body(tmp_path, capsys):
-    path, body = tmp_path / "hand.csv", hand_made(tmp_path)
+    path, body = tmp_path / "hand.csv", write_body(tmp_path / "body.bvh")
     times, poses = write_csv(path)
     assert run(path, body, "--keys", "9", "--output", tmp_path / "keyed") == 0
     key_times, keys = read_table(tmp_path / "keyed" / "hand-keys.csv")
@@ -96,7 +95,7 @@ BY_MODE = "--mode", "motor_spline"
 
 @pytest.mark.parametrize("options", [(*BY_MODE, "--shared"), (), ("--curves", "--shared")])
 def test_a_whole_body_becomes_a_rig_that_plays_like_it_in_any_blender(tmp_path, capsys, options):
-    source = hand_made(tmp_path)
+    source = write_body(tmp_path / "body.bvh")
     assert run(source, "--tolerance", "5mm", "--output", tmp_path / "keyed", *options) == 0
     made = tmp_path / "keyed" / "body-keys.blend"
     assert listed(made.parent) == [made.name]
@@ -172,7 +171,7 @@ def test_a_body_that_grows_has_its_size_in_the_table_and_in_the_file(tmp_path):
 
 @pytest.mark.any_blender
 def test_one_body_of_a_file_and_all_of_them_are_files_of_their_own(tmp_path):
-    source = hand_made(tmp_path)
+    source = write_body(tmp_path / "body.bvh")
     assert run(f"{source}:LeftHand", "--tolerance", "1cm") == 0
     assert (tmp_path / "body-LeftHand-keys.csv").is_file()
     assert run(f"{source}:*", "--tolerance", "1cm", "--output", tmp_path / "all") == 0
