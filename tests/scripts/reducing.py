@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from rigid_motion.animation import write_channel
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import normalise
+from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.cli import reduce
 from rigid_motion_batch.pipeline.steps import OWN_FOLDER
 from rigid_motion_batch.recordings.clips import Clip
@@ -112,9 +113,7 @@ def write_csv(path: Path, seconds: float = 1.0, rate: float = 90.0) -> tuple[np.
     """Write a recording in Blender's axes and metres, and return its times and poses."""
     times = np.arange(round(seconds * rate) + 1) / rate
     poses = swing(len(times), 3, 2.0 * rate)
-    rows = np.column_stack((times, poses.positions, poses.quaternions)).tolist()
-    lines = ["t,x,y,z,qw,qx,qy,qz", *(",".join(map(repr, row)) for row in rows)]
-    path.write_text("\n".join([*lines, ""]), encoding="utf-8")
+    write_poses(path, times, poses)
     return times, poses
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
+from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.analysis.modes import name_of_other
 from tests.balls import largest_displacements
 from tests.scripts.bvh_bodies import PLACES, angles_at, hips_at, write_body
@@ -17,14 +18,6 @@ from tests.scripts.comparing import ROOT, SMALL, poses_of, rows_of, run, table, 
 pytestmark = pytest.mark.any_blender
 
 FAST = ("--no-video", "--rates", "10")
-
-POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
-
-
-def write_poses(path: Path, columns: dict[str, np.ndarray]) -> Path:
-    lines = [",".join(map(repr, row)) for row in zip(*(columns[name].tolist() for name in ("t", *POSE)), strict=True)]
-    path.write_text("\n".join([",".join(("t", *POSE)), *lines, ""]))
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -35,10 +28,11 @@ def toss(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def mine(toss: Path) -> Path:
     """Every fourth pose of the recording without its ends, at other times and slightly displaced."""
-    columns = {name: column[5:-7:4].copy() for name, column in table(toss).items()}
-    columns["t"] += 0.003
-    columns["x"] += 0.01 * np.sin(np.arange(len(columns["t"])))
-    return write_poses(toss.with_name("mine.csv"), columns)
+    columns = {name: column[5:-7:4] for name, column in table(toss).items()}
+    poses, path = poses_of(columns), toss.with_name("mine.csv")
+    poses.positions[:, 0] += 0.01 * np.sin(np.arange(len(poses)))
+    write_poses(path, columns["t"] + 0.003, poses)
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -166,7 +160,7 @@ def test_a_film_has_a_lane_of_it(toss, mine, tmp_path):
 def test_what_cannot_be_compared_is_refused_in_a_line(other, complaint, toss, tmp_path, capsys):
     (tmp_path / "broken.csv").write_text("a,b\n1,2\n")
     late = table(toss)
-    write_poses(tmp_path / "late.csv", late | {"t": late["t"] - late["t"][0] + 100.0})
+    write_poses(tmp_path / "late.csv", late["t"] - late["t"][0] + 100.0, poses_of(late))
     write_body(tmp_path / "body.bvh")
     assert run(toss, "--against", tmp_path / other, *FAST, "--quiet", "--output", tmp_path / "output") == 2
     lines = capsys.readouterr().err.splitlines()

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import key_frames, modes_of
-from rigid_motion.motion import interpolate
+from rigid_motion.motion import Poses, interpolate
+from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.recordings.clip_reading import read_source
 from tests.animation.farm import played_on_a_farm
 from tests.animation.keyed import curves_of
@@ -157,9 +158,7 @@ def test_a_body_that_grows_has_its_size_in_the_table_and_in_the_file(tmp_path):
     path = tmp_path / "balloon.csv"
     times, poses = write_csv(path)
     sizes = 1.0 + 0.3 * np.sin(times)
-    header, *lines = path.read_text().splitlines()
-    rows = [f"{line},{size!r}" for line, size in zip(lines, sizes.tolist(), strict=True)]
-    path.write_text("\n".join([f"{header},scale", *rows]))
+    write_poses(path, times, Poses(poses.positions, poses.quaternions, sizes))
     assert run(path, "--tolerance", "5mm", "--blend") == 0
     assert (tmp_path / "balloon-keys.csv").read_text().startswith("t,x,y,z,qw,qx,qy,qz,s\n")
     worlds = worlds_of(poses)
@@ -181,10 +180,8 @@ def test_one_body_of_a_file_and_all_of_them_are_files_of_their_own(tmp_path):
 @pytest.mark.any_blender
 def test_what_is_far_away_is_refused_where_blender_could_not_hold_it(tmp_path, capsys):
     path = tmp_path / "hand.csv"
-    write_csv(path)
-    header, *lines = path.read_text().splitlines()
-    cells = [line.split(",") for line in lines]
-    path.write_text("\n".join([header, *(",".join([t, f"{float(x) + 1e6!r}", *rest]) for t, x, *rest in cells)]))
+    times, poses = write_csv(path)
+    write_poses(path, times, Poses(poses.positions + 1e6, poses.quaternions))
     assert run(path) == 0
     assert run(path, "--blend", "--overwrite") == 1
     assert f"{path}: this is up to 1e+06 m from its origin" in capsys.readouterr().err

@@ -1,13 +1,134 @@
+"""Tests of metrics as rows and tables: what they measure, and that hostile names survive."""
+
+import csv
+import re
+from dataclasses import astuple
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from rigid_motion.motion import shell_error
-from rigid_motion_batch.analysis.choices import Radii, Uniform
-from rigid_motion_batch.analysis.results import clip_result
+from rigid_motion_batch.analysis.choices import Choice, Radii, Tolerance, Uniform
+from rigid_motion_batch.analysis.metrics import JointMetrics, table_names, write_tables
+from rigid_motion_batch.analysis.reconstructions import Ground, Reconstruction, errors_of, reconstruct
+from rigid_motion_batch.analysis.results import clip_result, measured
+from rigid_motion_batch.files import escaped, write_rows
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.clip_reading import read_source
-from tests.scripts.clips.bodies import swinging_body
+from tests.scripts.clips.bodies import JOINTS, swinging_body
 from tests.scripts.clips.recordings import compare_clip
+
+HEADER = (
+    "clip,joint,mode,rate_hz,keys,samples,rms_shell_m,p95_shell_m,max_shell_m,worst_s,"
+    "rms_position_m,rms_rotation_deg,rms_velocity_m_s,decimation,tolerance_m"
+)
+
+HOSTILE = (
+    'a,b;"c"',
+    "two\nlines",
+    "three\r\nlines\rof it",
+    "<script>alert(1)</script>",
+    "=cmd|' /C calc'!A0",
+    " ",
+    "",
+    "'=1+1\t\u2028\x85\x1c\u200b",
+)
+"""Names with special characters, one for each joint of the body."""
+
+MODES = ("lerp_slerp", "dq_sclerp", "cga_slerp", "motor_spline")
+
+RADII = np.linspace(0.02, 0.12, len(JOINTS))
+
+CHOICES = [Uniform("5"), Tolerance("2cm")]
+
+
+def made_of(
+    choice: Choice = CHOICES[0], modes: tuple[str, ...] = MODES, joints: tuple[str, ...] = JOINTS, **settings: bool
+) -> Reconstruction:
+    clip = swinging_body(joints=joints)
+    return reconstruct(clip, choice, modes, RADII, **settings)
+
+
+def cells_of(path: Path) -> list[list[str]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.reader(stream))
+    assert not any(
+        cell.startswith(("=", "+", "-", "@", "\t", "\r")) for row in rows for cell in row if not number(cell)
+    )
+    return [[cell[1:] if cell[:1] == "'" and escaped(cell) != cell else cell for cell in row] for row in rows]
+
+
+def number(cell: str) -> bool:
+    return bool(re.fullmatch(r"-?[\d.]+(e[+-]\d+)?", cell))
+
+
+@pytest.mark.parametrize("choice", CHOICES, ids=str)
+def test_the_rows_are_statistics_of_all_joints_and_of_each(choice: Choice) -> None:
+    made = made_of(choice)
+    result = measured(made)
+    assert [row.mode for row in result.rows] == list(MODES)
+    assert [(row.mode, row.joint) for row in result.joints] == [(mode, joint) for mode in MODES for joint in JOINTS]
+    for row in result.rows:
+        errors = errors_of(made, row.mode, Ground.of(made))
+        own = [joint for joint in result.joints if joint.mode == row.mode]
+        assert row.rms_shell_m == pytest.approx(np.sqrt(np.mean([joint.rms_shell_m**2 for joint in own])))
+        assert row.max_shell_m == max(joint.max_shell_m for joint in own) == errors.shell.max()
+        assert row.worst_joint == max(own, key=lambda joint: joint.max_shell_m).joint
+        assert row.rms_position_m == pytest.approx(np.sqrt(np.mean([joint.rms_position_m**2 for joint in own])))
+        assert row.rms_rotation_deg == pytest.approx(np.sqrt(np.mean([joint.rms_rotation_deg**2 for joint in own])))
+        assert row.rms_velocity_m_s == pytest.approx(np.sqrt(np.mean([joint.rms_velocity_m_s**2 for joint in own])))
+        assert row.keys == sum(joint.keys for joint in own)
+        assert row.joints == len(JOINTS)
+        assert (row.rate_hz, row.decimation, row.tolerance_m) == (
+            ("5", "uniform", None) if choice is CHOICES[0] else ("", "adaptive", 0.02)
+        )
+        for number, joint in enumerate(own):
+            at = np.argmin(np.abs(made.times - made.times[0] - joint.worst_s))
+            assert errors.shell[number, at] == joint.max_shell_m
+            assert joint.rms_shell_m <= joint.max_shell_m
+            assert joint.p95_shell_m <= joint.max_shell_m
+
+
+def test_a_joint_that_stays_as_it_is_sends_nothing() -> None:
+    (row, *_) = measured(made_of()).rows
+    moving = len(JOINTS) - 1
+    assert row.keys == 11 * moving + 1
+    assert row.keys_per_s == pytest.approx(5.0)
+    assert row.bytes_per_s == pytest.approx(5.0 * moving * 56)
+    assert row.key_frames == 11
+
+
+def test_the_columns_are_those_promised_and_read_back_exactly(tmp_path: Path) -> None:
+    result = measured(made_of(CHOICES[1], joints=HOSTILE))
+    write_rows(tmp_path / "joints.csv", JointMetrics, result.joints)
+    assert (tmp_path / "joints.csv").read_text().splitlines()[0] == HEADER
+    header, *rows = cells_of(tmp_path / "joints.csv")
+    assert {len(row) for row in rows} == {len(header)}
+    assert [row[1] for row in rows] == [*HOSTILE] * len(MODES)
+    for row, expected in zip(rows, result.joints, strict=True):
+        for cell, value in zip(row, astuple(expected), strict=True):
+            assert type(value)(cell) == value
+
+
+@pytest.mark.parametrize("joints", [JOINTS, HOSTILE], ids=["plain", "hostile"])
+@pytest.mark.parametrize("choice", CHOICES, ids=str)
+def test_keys_are_tables_of_poses_in_parents_space_and_read_back_exactly(tmp_path, choice, joints):
+    made = made_of(choice, joints=joints)
+    write_tables(tmp_path, made)
+    names = table_names(choice, MODES, body=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+    for name in names:
+        keys = made.keys[MODES[0] if name == "keys.csv" else name.removesuffix(".keys.csv")]
+        header, *rows = cells_of(tmp_path / name)
+        assert header == ["joint", "t", "x", "y", "z", "qw", "qx", "qy", "qz"]
+        own = [joint for joint, own in zip(joints, keys, strict=True) for _ in own]
+        assert [row[0] for row in rows] == own
+        assert [[float(cell) for cell in row[1:]] for row in rows] == [
+            [made.clip.times[key], *made.clip.poses.positions[number, key], *made.clip.poses.quaternions[number, key]]
+            for number in range(len(joints))
+            for key in keys[number]
+        ]
 
 
 @pytest.mark.parametrize("body", [False, True])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigid_motion.motion import KEYFRAME_MODES, Poses, rms
+from rigid_motion.motion import Poses, rms
 from rigid_motion.motion.quaternions import normalise, rotate
 from rigid_motion_batch.analysis import reconstructions
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
@@ -85,14 +85,6 @@ def test_keys_that_the_motion_chooses_keep_every_joint_within_the_tolerance(mode
     moved = [tuple(own) for own in made.keys[mode] if len(own) > 1]
     assert (len(set(moved)) == 1) == shared
     assert all(own[0] == 0 and own[-1] == len(made.clip.times) - 1 for own in moved)
-
-
-@pytest.mark.parametrize("mode", KEYFRAME_MODES)
-def test_errors_are_had_again_by_matrices(mode: str) -> None:
-    made = evenly(swinging_body(seed=5), "4", (mode,))
-    errors = measured(made, mode).shell
-    np.testing.assert_allclose(errors, errors_by_matrices(made, mode), atol=1e-9)
-    assert rms(made.shell(mode)) == pytest.approx(np.sqrt(np.mean(errors**2)), rel=1e-12)
 
 
 @pytest.mark.parametrize("block", [1, 7, 61])

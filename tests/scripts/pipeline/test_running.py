@@ -1,4 +1,4 @@
-"""Tests of runs of plans, with any executor."""
+"""Tests of runs of plans: with any executor, in separate processes, and if one dies."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rigid_motion_batch.pipeline.steps import OWN_FOLDER, Step, Task
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import Listener, contents, half_written, joining, run, run_in, states, task, writing
-from tests.scripts.pipeline.steps import Fail, Join, Write
+from tests.scripts.pipeline.steps import Die, Fail, Join, Write
 
 
 class Log:
@@ -198,3 +198,50 @@ def test_progress_is_told_in_weights_and_names(output: Path) -> None:
     assert any(doing == "b" and done in (2.0, 4.0) for done, doing in listener.reached)  # Half of the total is 2.0.
     assert listener.reached[-1][0] == 6.0
     assert states(outcome) == {"done": 2}
+
+
+needs_signals = pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+
+
+def test_tasks_are_done_by_as_many_processes_as_there_are_jobs(output: Path) -> None:
+    tasks = [task(name, steps.ProcessId(name, 0.4)) for name in "abcd"]
+    run_in(output, *tasks, executor=ProcessExecutor(2))
+    workers = set(contents(output).values())
+    assert len(workers) == 2
+    assert str(os.getpid()) not in workers
+
+
+@needs_signals
+def test_a_worker_that_dies_is_replaced_and_its_task_done_again(output: Path, tmp_path: Path) -> None:
+    dying = task("b", Die(str(tmp_path / "marker"), 2))
+    listener = Listener()
+    tasks = [writing("a"), dying, joining("c", dying)]
+    assert states(run_in(output, *tasks, executor=ProcessExecutor(2), progress=listener)) == {"done": 3}
+    assert contents(output)["c.txt"] == "whole"
+    said = "b: its process died (SIGKILL, perhaps for want of memory); trying again"
+    assert listener.notes == [said, said]
+
+
+@needs_signals
+def test_a_task_that_kills_every_worker_is_given_up_and_the_others_go_on(output: Path, tmp_path: Path) -> None:
+    bad = task("bad", Fail())
+    needs_bad = joining("c", bad)
+    tasks = [task("b", Die(str(tmp_path / "marker"), 99, "reading\nno such bone: Hand\n\n")), bad, writing("a")]
+    outcome = run_in(output, *tasks, needs_bad, joining("d", needs_bad), executor=ProcessExecutor(1))
+    assert states(outcome) == {"failed": 2, "done": 1, "skipped": 2}
+    assert outcome.failures["bad"] == "it cannot be made; make another"
+    died = "its process died (SIGKILL, perhaps for want of memory): no such bone: Hand"
+    assert outcome.failures["b"] == f"b: {died}; given up after 3 attempts"
+    assert contents(output) == {"a.txt": "a"}
+
+
+def test_what_is_printed_in_a_worker_does_not_get_in_the_way(output: Path, capfd: pytest.CaptureFixture) -> None:
+    run_in(output, task("a", steps.Chatter()), executor=ProcessExecutor(1))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_an_executor_can_be_used_again_after_it_was_stopped(output: Path) -> None:
+    with Store(output) as store, ProcessExecutor(1) as executor:
+        run(lambda: [writing("a")], store, executor)
+        executor.stop()
+        assert states(run(lambda: [writing("b")], store, executor)) == {"done": 1}

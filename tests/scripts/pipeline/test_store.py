@@ -1,4 +1,4 @@
-"""Tests of the output folder: foreign files are never replaced, damage is noticed, two runs cannot share it."""
+"""Tests of the output folder: foreign files are never replaced, damage and changed code are noticed."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 from filelock import SoftFileLock
 
+from rigid_motion_batch import places
 from rigid_motion_batch.pipeline import steps as pipeline_steps
 from rigid_motion_batch.pipeline.executors import Executor
-from rigid_motion_batch.pipeline.steps import OWN_FOLDER, RunError, Task
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER, RunError, Task, digest_of
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import contents, joining, run, run_in, states, task, writing
@@ -237,3 +238,49 @@ def test_a_folder_for_nothing_is_gone_where_a_lock_that_is_held_cannot_be_delete
     with Store(output) as store:
         pass
     assert not output.exists()
+
+
+@pytest.fixture
+def room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a folder that stands for the program, with two rooms (folders of modules)."""
+    monkeypatch.setattr(places, "place_of", lambda name: tmp_path / name)
+    digest_of.cache_clear()
+    (tmp_path / "measuring" / "deep").mkdir(parents=True)
+    (tmp_path / "drawing").mkdir()
+    return tmp_path
+
+
+def in_rooms(*rooms: str) -> Task:
+    digest_of.cache_clear()
+
+    class Measure(Write, rooms=rooms):
+        pass
+
+    return task("a", Measure("1"), publish={})
+
+
+def test_a_change_in_a_room_redoes_the_steps_that_use_it_and_no_others(room: Path) -> None:
+    inner = room / "measuring" / "deep" / "one.py"
+    inner.write_text("1")
+    before, other = in_rooms("measuring").key, in_rooms("drawing").key
+    inner.write_text("2")
+    (room / "measuring" / "__pycache__").mkdir()
+    assert in_rooms("measuring").key != before
+    assert in_rooms("drawing").key == other
+    (room / "measuring" / "__pycache__" / "one.pyc").write_text("")
+    inner.write_text("1")
+    assert in_rooms("measuring").key == before
+
+
+@pytest.mark.parametrize("change", ["added", "removed", "renamed"])
+def test_files_that_come_and_go_change_a_room(room: Path, change: str) -> None:
+    template = room / "measuring" / "page.html"
+    template.write_text("1")
+    before = in_rooms("measuring").key
+    if change == "added":
+        (room / "measuring" / "chart.json").write_text("")
+    elif change == "removed":
+        template.unlink()
+    else:
+        template.rename(template.with_name("other.html"))
+    assert in_rooms("measuring").key != before

@@ -23,6 +23,7 @@ from rigid_motion_batch.scenes.film import save_blend
 from rigid_motion_batch.scenes.physique import BONE
 from rigid_motion_batch.scenes.settings import SceneSettings
 from rigid_motion_batch.scenes.timeline import Timeline
+from tests.balls import largest_displacements
 from tests.scripts.clips.dancers import JOINTS, dancing_clip
 
 BODIES = Path(__file__).parents[1] / "recordings" / "bodies"
@@ -137,19 +138,13 @@ def test_bones_have_the_keys_that_were_kept_and_their_mode(tmp_path):
 
 
 def errors_at(made: Reconstruction, mode: str, frame: int) -> np.ndarray:
-    """Return the largest displacement of any point of the ball at each joint, from many random points."""
+    """Return the largest displacement of any point of the ball at each joint."""
     time = np.atleast_1d(timeline_of(made).times_of(np.array(float(frame))))
     number = int(np.searchsorted(made.clip.times, time[0] - 1e-9))
     assert made.clip.times[number] == pytest.approx(time[0])
     shown, truth = made.shown(mode, time)[:, 0], made.truth(slice(number, number + 1))[:, 0]
-    random = np.random.default_rng(0).normal(size=(4000, 3))
-    ball = RADIUS * random / np.linalg.norm(random, axis=1, keepdims=True)
-
-    def points(poses: Poses) -> np.ndarray:
-        turns = Rotation.from_quat(poses.quaternions, scalar_first=True).as_matrix()
-        return np.einsum("jab,pb->jpa", turns, ball) + poses.positions[:, None]
-
-    return np.linalg.norm(points(shown) - points(truth), axis=-1).max(axis=1)
+    turns = [Rotation.from_quat(poses.quaternions, scalar_first=True).as_matrix() for poses in (shown, truth)]
+    return largest_displacements(shown.positions - truth.positions, RADIUS * (turns[0] - turns[1]))
 
 
 @pytest.mark.parametrize("skin", [False, True], ids=["solids", "skin"])

@@ -20,10 +20,10 @@ import pytest
 import zenoh  # noqa: F401 - without it these tests are skipped
 
 from rigid_motion.motion.measures import shell_error
-from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Receiver
 from rigid_motion.streams.paths import KnotPath as Knots
 from rigid_motion_batch.analysis.held import distances, seen_from
+from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.cli.stream import main
 from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
@@ -31,6 +31,7 @@ from rigid_motion_batch.recordings.rest_bodies import RestBody
 from rigid_motion_batch.streaming.receiving import Receiving
 from rigid_motion_batch.streaming.rooms import LOOPBACK_ADDRESS, Room, is_local, locator, opened, settings
 from rigid_motion_batch.streaming.sending import samples_of
+from tests.scripts.clips.recordings import swinging_clip
 from tests.streams.links import body, dance
 
 pytestmark = [pytest.mark.network, pytest.mark.once]
@@ -70,15 +71,9 @@ def endless(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def write_csv(path: Path, seconds: float) -> Path:
-    """Write a smooth motion of a few decimetres and half turns, up to two cycles per second, sampled at 90 Hz."""
-    random = np.random.default_rng(3)
-    times = np.arange(round(seconds * 90.0) + 1) / 90.0
-    frequencies, phases = random.uniform(0.1, 2.0, (7, 4, 1)), random.uniform(0.0, 2.0 * np.pi, (7, 4, 1))
-    waves = random.normal(size=(7, 4, 1)) / frequencies * np.sin(2.0 * np.pi * frequencies * times + phases)
-    channels = waves.sum(axis=1).T
-    turns = normalise(channels[:, 3:] + (3.0, 0.0, 0.0, 0.0))
-    rows = np.column_stack((times, 0.2 * channels[:, :3], turns)).tolist()
-    path.write_text("\n".join(["t,x,y,z,qw,qx,qy,qz", *(",".join(map(repr, row)) for row in rows)]))
+    """Write a smooth motion of a few decimetres, sampled at 90 Hz."""
+    clip = swinging_clip(seconds=seconds, seed=3)
+    write_poses(path, clip.times - clip.times[0], clip.poses)
     return path
 
 
@@ -365,21 +360,3 @@ def test_without_zenoh_the_way_out_is_said(monkeypatch, capsys, hand):
     monkeypatch.setattr("rigid_motion_batch.places.CHECKOUT", None)
     assert main(["router"]) == 2
     assert "pip install 'rigid-motion[stream]'" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (("send", "hand.csv", "--room", "a/*"), "not a name for a room"),
-        (("send", "hand.csv", "--room", "r", "--user", "a/b"), "not a name for a user"),
-        (("send", "hand.csv", "--room", "r", "--tolerance", "5 parsecs"), "5 parsecs"),
-        (("send", "hand.csv", "--room", "r", "--delay", "9"), "not a number of seconds"),
-        (("receive", "--room", "r", "--output", "shown.txt"), "one that ends in .csv, .bvh"),
-        (("receive", "--room", "r", "--to-blender", "39539"), "not an address"),
-    ],
-)
-def test_what_cannot_be_is_refused(capsys, options, said):
-    with pytest.raises(SystemExit) as ended:
-        main(list(options))
-    assert ended.value.code == 2
-    assert said in capsys.readouterr().err

@@ -113,24 +113,6 @@ def test_what_a_receiver_shows_goes_to_another_program(listener):
     assert keys.poses["VMC"].positions[1, -1] == pytest.approx(in_world(poses).positions[0, -7], abs=0.005)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["send", "a.csv", "--from-vmc", "39539", "--room", "studio"], "and not both"),
-        (["send", "--room", "studio"], "give recordings, or --from-vmc"),
-        (["send", "a.csv", "--to-vmc", "127.0.0.1:1", "--room", "studio"], "without a room"),
-        (["send", "a.csv"], "give --room NAME"),
-        (["receive", "--room", "studio", "--to-vmc", "192.0.2.1:39540"], "give --network as well"),
-        (["receive", "--room", "studio", "--clean", "--mode", "motor_spline"], "give --clean without it"),
-    ],
-)
-def test_what_does_not_go_together_is_said(arguments, said, capsys):
-    with pytest.raises(SystemExit) as ended:
-        stream.parse(arguments)
-    assert ended.value.code == 2
-    assert said in capsys.readouterr().err
-
-
 def test_a_performer_goes_through_a_room_to_another_program(listener):
     room, vmc = ("--room", "studio", "--at", f"{LOOPBACK_ADDRESS}:{free_port()}"), free_udp_port()
     to = f"127.0.0.1:{listener.getsockname()[1]}"

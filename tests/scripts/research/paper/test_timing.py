@@ -1,11 +1,18 @@
-"""Tests of the races: all engines do the same work, and the seconds are evaluated correctly. No test of the speed."""
+"""Tests of the paper's races and bodies: all engines do the same work, and recordings at rest are not used."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from research.paper import timing
+from research.paper import bodies, timing
+from research.paper.motions import MAX_REST_RMS, read_motion
 from research.paper.table import PAPER_RATES_PER_S, UPDATES
-from rigid_motion.motion import MODES
+from rigid_motion.motion import MODES, Poses
+from rigid_motion_batch.analysis.metrics import write_poses
+from rigid_motion_batch.recordings import TrajectoryError
+from tests.motion.bodies import body_errors
+from tests.scripts.clips.bodies import PARENTS, swinging_body
 from tests.scripts.research.paper.clips import circling
 
 CLIP = circling(turns=0.7, rate=90.0, seconds=1.0)
@@ -36,3 +43,29 @@ def test_the_races_have_every_mode_at_the_rates_that_were_asked_for(monkeypatch:
         assert result["equal"]["lerp_slerp"][rate]["relative"] == 1.0
     assert set(result["algebra"]) == set(EXACT)
     assert all(item["processor"] > 0.0 for item in result["algebra"].values())
+
+
+NAMES = ("Hips", "Spine", "Head", "LeftArm", "LeftHand", "Glove", "RightLeg", "RightFoot")
+
+BODY_CLIP = swinging_body("walk", seconds=2.0, rate=30.0, seed=3, joints=NAMES)
+
+RADII = np.full(len(NAMES), 0.03)
+
+METRES = Poses(BODY_CLIP.poses.positions * 0.01, BODY_CLIP.poses.quaternions)
+
+
+def test_errors_of_the_body_are_those_of_matrices() -> None:
+    rows = bodies.errors_of(BODY_CLIP)
+    for mode in bodies.MODES:
+        for rate in bodies.ERROR_RATES:
+            keys = np.arange(0, 61, 30 // rate)
+            errors = body_errors(BODY_CLIP.times, METRES, PARENTS, (keys,) * len(NAMES), mode, RADII)
+            assert rows[mode][rate][0] == pytest.approx(np.sqrt(np.mean(errors**2)), rel=1e-6)
+
+
+def test_a_body_that_stays_within_a_centimetre_of_its_mean_is_at_rest(tmp_path: Path):
+    times = np.arange(200) / 50.0
+    swinging = MAX_REST_RMS * np.sin(np.linspace(0.0, 9.0, 200))[:, None] * (1.0, 0.0, 0.0)
+    write_poses(tmp_path / "rests.csv", times, Poses(swinging, np.tile((1.0, 0.0, 0.0, 0.0), (200, 1))))
+    with pytest.raises(TrajectoryError, match="at rest"):
+        read_motion(tmp_path / "rests.csv")
