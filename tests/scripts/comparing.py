@@ -4,10 +4,12 @@ import csv
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import Poses
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.pipeline.steps import OWN_FOLDER
+from tests.balls import largest_displacements
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -39,6 +41,12 @@ def poses_of(columns: dict[str, np.ndarray]) -> Poses:
         np.stack([columns[name] for name in ("x", "y", "z")], axis=-1),
         np.stack([columns[name] for name in ("qw", "qx", "qy", "qz")], axis=-1),
     )
+
+
+def shell_errors(shown: Poses, truth: Poses, radius: float) -> np.ndarray:
+    """Return how far the farthest points of balls at poses (n,) are from their true places, shape (n,), by SciPy."""
+    turns = [Rotation.from_quat(poses.quaternions, scalar_first=True).as_matrix() for poses in (shown, truth)]
+    return largest_displacements(shown.positions - truth.positions, radius * (turns[0] - turns[1]))
 
 
 def write_toss(path: Path, samples: int = 60) -> Path:

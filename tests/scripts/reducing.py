@@ -17,6 +17,7 @@ from tests.animation.farm import played_on_a_farm
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
 from tests.balls import largest_displacements
+from tests.gltf.making import Making
 from tests.recordings import RECORDINGS
 from tests.scripts.baking import new_file, open_again, save
 from tests.scripts.recordings.blends import rig
@@ -115,6 +116,15 @@ def write_csv(path: Path, seconds: float = 1.0, rate: float = 90.0) -> tuple[np.
     poses = swing(len(times), 3, 2.0 * rate)
     write_poses(path, times, poses)
     return times, poses
+
+
+def write_still(path: Path) -> Path:
+    """Write a GLB file without animations."""
+    made = Making()
+    made.json["nodes"] = [{}]
+    made.view(b"mesh")
+    del made.json["animations"]
+    return made.write(path)
 
 
 def read_table(path: Path) -> tuple[np.ndarray, Poses]:

@@ -64,7 +64,7 @@ class Started:
         return printed, said, time.monotonic() - started
 
 
-def start(folder: Path, command: str, *arguments: object, where: str, act: str = HANG, **options: object) -> Started:
+def start(folder: Path, command: str, *arguments: object, where: str, act: str = HANG) -> Started:
     """Start a script that gets stuck when it opens a file, or moves one into place, with `where` in its name."""
     own = folder / "stuck"
     temporary, marker = own / "temporary", own / "marker"
@@ -73,8 +73,8 @@ def start(folder: Path, command: str, *arguments: object, where: str, act: str =
     (own / "sitecustomize.py").write_text(content, encoding="utf-8")
     line = [sys.executable, str(ROOT / "scripts" / command), *map(str, arguments)]
     environment = os.environ | {"PYTHONPATH": str(own), "TMPDIR": str(temporary)}
-    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
-    process = subprocess.Popen(line, env=environment, cwd=folder, start_new_session=True, **streams)
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    process = subprocess.Popen(line, env=environment, cwd=folder, start_new_session=True, text=True, **streams)
     return Started(process, temporary, marker)
 
 

@@ -128,15 +128,8 @@ def test_gltf_files_and_tables_are_reduced_without_a_blender(installed, monkeypa
     monkeypatch.chdir(tmp_path)
     for name in ("small", "empty", "folder", "shots/b"):
         (tmp_path / name).mkdir(parents=True)
-    for name in (
-        "walk.glb",
-        "wave.vrma",
-        "hand.csv",
-        "folder/Walk.GLB",
-        "folder/a.png",
-        "shots/a.glb",
-        "shots/b/c.fbx",
-    ):
+    files = "walk.glb wave.vrma hand.csv folder/Walk.GLB folder/a.png shots/a.glb shots/b/c.fbx"
+    for name in files.split():
         (tmp_path / name).touch()
     assert bootstrap.main(["reduce", *arguments.split()]) == 0
     assert [blender is not None for blender in installed] == [is_needed]

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
+from rigid_motion.motion import Poses
 from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.analysis.modes import name_of_other
 from tests.balls import largest_displacements
 from tests.scripts.bvh_bodies import PLACES, angles_at, hips_at, write_body
-from tests.scripts.comparing import ROOT, SMALL, poses_of, rows_of, run, table, write_toss
+from tests.scripts.comparing import ROOT, SMALL, poses_of, rows_of, run, shell_errors, table, write_toss
 
 pytestmark = pytest.mark.any_blender
 
@@ -67,8 +68,7 @@ def test_its_numbers_are_those_of_straight_lines_and_slerp_between_its_samples(t
         at = np.searchsorted(recording["t"], filled["t"])
         truth = poses_of({name: column[at] for name, column in recording.items()})
         recorded = Rotation.from_quat(truth.quaternions, scalar_first=True)
-        offsets = positions - truth.positions
-        shell = largest_displacements(offsets, 0.1 * (turns.as_matrix() - recorded.as_matrix()))
+        shell = shell_errors(Poses(positions, turns.as_quat(scalar_first=True)), truth, 0.1)
         assert float(row["rms_shell_m"]) == pytest.approx(np.sqrt(np.mean(shell**2)), rel=1e-9)
         assert float(row["max_shell_m"]) == pytest.approx(shell.max(), rel=1e-9)
         turned = np.degrees((recorded.inv() * turns).magnitude())

@@ -43,9 +43,7 @@ def test_what_a_hand_holds_is_found_and_slips_by_curves_and_lines(rows: list[dic
     assert slip["10", "bezier"] < slip["5", "bezier"]
 
 
-def test_the_terminal_and_the_page_say_it(
-    rows: list[dict[str, str]], output: Path, capsys: pytest.CaptureFixture
-) -> None:
+def test_the_terminal_and_the_page_say_it(rows, output, capsys):
     assert run(f"{HOLD}:*", *FAST, "--output", output) == 0
     (line,) = [line for line in capsys.readouterr().out.splitlines() if "holds" in line]
     assert line.startswith("hold-hand holds hold-tool, which slips up to ")
@@ -84,9 +82,7 @@ def test_a_pair_that_is_named_is_measured_and_not_found_twice(tmp_path: Path) ->
         (("hold-hand", "later"), "they share no times, later lasts from 50 to 5"),
     ],
 )
-def test_a_pair_that_is_none_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture, named: tuple[str, str], said: str
-) -> None:
+def test_a_pair_that_is_none_is_refused(tmp_path, capsys, named, said):
     later, body = tmp_path / "later.csv", write_body(tmp_path / "body.bvh")
     later.write_text("t,x,y,z,qx,qy,qz,qw\n" + "".join(f"{50.0 + x},{x},0,0,0,0,0,1\n" for x in range(5)))
     assert run(f"{HOLD}:*", later, body, "--held", *named, *FAST, "--output", tmp_path / "output") == 2

@@ -7,7 +7,6 @@ import bpy
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import key_frames, modes_of
 from rigid_motion_batch.keying import blend_files, recordings
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
@@ -27,23 +26,9 @@ from tests.scripts.reducing import (
     write_csv,
 )
 
-
-@pytest.mark.parametrize("mode", ["motor_spline", "lerp_slerp", "BLENDER"])
-def test_an_object_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_path, mode):
-    path = object_file(tmp_path / "shot.blend")
-    before = path.read_bytes()
-    assert run(path, "--tolerance", "5mm", *(["--curves"] if mode == "BLENDER" else ["--mode", mode])) == 0
-    assert path.read_bytes() == before
-    assert listed(tmp_path) == ["shot-reduced.blend", "shot.blend"]
-    assert 0.0 < displacement(played(reduced_name(path), "Tool"), played(path, "Tool")) <= 5e-3 + ROUNDING
-    with extension():
-        open_again(reduced_name(path))
-        tool = bpy.data.objects["Tool"]
-        assert 2 < count_keys(tool) < len(FRAMES) / 2
-        assert set(modes_of(tool, key_frames(tool)[:-1])) == {mode}
+pytestmark = pytest.mark.any_blender
 
 
-@pytest.mark.any_blender
 def test_a_tolerance_in_metres_is_that_in_a_scene_of_centimetres(tmp_path):
     path = object_file(tmp_path / "shot.blend")
     bpy.context.scene.unit_settings.scale_length = 0.01
@@ -53,21 +38,6 @@ def test_a_tolerance_in_metres_is_that_in_a_scene_of_centimetres(tmp_path):
     assert 1e-3 < off <= 5e-3 + ROUNDING, "5 thousandths of a centimetre"
 
 
-@pytest.mark.parametrize("options", [(), ("--curves",)])
-def test_a_rig_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_path, capsys, options):
-    path = rig_file(tmp_path / "shot.blend")
-    before, probes = path.read_bytes(), ("at Root", "at Arm", "at Hand")
-    assert run(path, "--tolerance", "5mm", *options) == 0
-    assert path.read_bytes() == before
-    # The end of a bone is as far from its head as its radius.
-    assert 0.0 < displacement(played(reduced_name(path), *probes), played(path, *probes), 0.0) <= 5e-3 + ROUNDING
-    open_again(reduced_name(path))
-    counts = [count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones]
-    assert sum(counts) < 3 * len(FRAMES) / 2
-    assert f"Rig: 3 bones reduced, {3 * len(FRAMES)} -> {sum(counts)} keys" in capsys.readouterr().err
-
-
-@pytest.mark.any_blender
 def test_bones_that_follow_constraints_are_named_and_what_hangs_on_them(tmp_path, capsys):
     path = rig_file(tmp_path / "shot.blend")
     bpy.data.objects["Rig"].pose.bones["Arm"].constraints.new("COPY_ROTATION").target = new_object("Target")
@@ -77,7 +47,6 @@ def test_bones_that_follow_constraints_are_named_and_what_hangs_on_them(tmp_path
     assert "; not guaranteed for bones that follow constraints or drivers, or their children: Arm, Hand\n" in said
 
 
-@pytest.mark.any_blender
 def test_key_poses_are_few_and_on_the_same_frames_for_all_bones(tmp_path, capsys):
     path = rig_file(tmp_path / "shot.blend")
     assert run(path, "--shared") == 0
@@ -91,7 +60,6 @@ def test_key_poses_are_few_and_on_the_same_frames_for_all_bones(tmp_path, capsys
     assert len(frames[0]) < len(FRAMES)
 
 
-@pytest.mark.any_blender
 def test_the_dense_keys_are_left_out_where_that_is_asked_for(tmp_path):
     path = object_file(tmp_path / "shot.blend")
     assert run(path, "--discard") == 0
@@ -101,7 +69,6 @@ def test_the_dense_keys_are_left_out_where_that_is_asked_for(tmp_path):
         assert [action.name for action in bpy.data.actions] == [bpy.data.objects["Tool"].animation_data.action.name]
 
 
-@pytest.mark.any_blender
 def test_what_needs_its_keys_is_left_alone_and_nothing_is_wrong(tmp_path, capsys):
     path = object_file(tmp_path / "shot.blend")
     assert run(path, "--tolerance", "0.00001mm") == 0
@@ -111,7 +78,6 @@ def test_what_needs_its_keys_is_left_alone_and_nothing_is_wrong(tmp_path, capsys
     assert listed(tmp_path) == ["shot.blend"]
 
 
-@pytest.mark.any_blender
 def test_what_is_asked_for_by_name_and_has_no_keys_is_told_why(tmp_path, capsys):
     path = object_file(tmp_path / "shot.blend")
     still = new_object("Still")
@@ -122,7 +88,6 @@ def test_what_is_asked_for_by_name_and_has_no_keys_is_told_why(tmp_path, capsys)
     assert not reduced_name(path).exists()
 
 
-@pytest.mark.any_blender
 def test_without_a_tolerance_a_rig_of_any_size_begins_with_one_that_fits_it(tmp_path):
     path = rig_file(tmp_path / "shot.blend")
     bpy.data.objects["Rig"].scale = (200.0,) * 3
@@ -132,7 +97,6 @@ def test_without_a_tolerance_a_rig_of_any_size_begins_with_one_that_fits_it(tmp_
     assert sum(count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones) < 3 * len(FRAMES) / 2
 
 
-@pytest.mark.any_blender
 def test_a_dry_run_says_all_also_as_json_and_writes_nothing(tmp_path, capsys):
     shot, hand, body = rig_file(tmp_path / "shot.blend"), tmp_path / "hand.csv", write_body(tmp_path / "body.bvh")
     write_csv(hand)
@@ -156,7 +120,6 @@ def test_a_dry_run_says_all_also_as_json_and_writes_nothing(tmp_path, capsys):
 # Files that are left alone, and exit codes
 
 
-@pytest.mark.any_blender
 def test_what_cannot_be_read_is_named_and_the_others_are_done(tmp_path, capsys):
     good = tmp_path / "hand.csv"
     write_csv(good)
@@ -172,7 +135,6 @@ def test_what_cannot_be_read_is_named_and_the_others_are_done(tmp_path, capsys):
     assert run(tmp_path / "gone.csv", damaged, f"{body}:Nose") == 2
 
 
-@pytest.mark.any_blender
 def test_a_recording_is_not_written_over_one_that_is_to_be_read_or_was_just_written(tmp_path, capsys):
     for name in ("hand", "hand-keys"):
         write_csv(tmp_path / f"{name}.csv")
@@ -187,7 +149,6 @@ def test_a_recording_is_not_written_over_one_that_is_to_be_read_or_was_just_writ
     assert f"{tmp_path / 'hand.csv'} is written to {tmp_path / 'hand-keys.csv'} too" in capsys.readouterr().err
 
 
-@pytest.mark.any_blender
 def test_a_recording_that_is_named_twice_is_done_once(tmp_path, capsys, monkeypatch):
     write_csv(tmp_path / "hand.csv")
     (tmp_path / "link.csv").symlink_to("hand.csv")
@@ -196,7 +157,6 @@ def test_a_recording_that_is_named_twice_is_done_once(tmp_path, capsys, monkeypa
     assert capsys.readouterr().out == "hand-keys.csv\n"
 
 
-@pytest.mark.any_blender
 @pytest.mark.parametrize("kind", ["blend", "table"])
 def test_what_another_run_has_written_meanwhile_stays(tmp_path, capsys, monkeypatch, kind):
     if kind == "table":
@@ -226,7 +186,6 @@ def test_what_another_run_has_written_meanwhile_stays(tmp_path, capsys, monkeypa
     assert result.stat().st_size > 1000
 
 
-@pytest.mark.any_blender
 def test_a_file_that_was_saved_meanwhile_is_not_replaced_in_place(tmp_path, capsys, monkeypatch):
     path, real = object_file(tmp_path / "shot.blend"), blend_files.save_copy
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from rigid_motion_batch.cli import reduce
-from tests.gltf.making import Making, walk
+from tests.gltf.making import walk
 from tests.scripts.bvh_bodies import write_body
-from tests.scripts.reducing import listed, object_file, run, write_csv
+from tests.scripts.reducing import listed, object_file, run, write_csv, write_still
 from tests.scripts.stopping import ROOT, start
 
 pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
@@ -24,14 +24,6 @@ ON_LINUX = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="look
 def glb(path: Path) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     return walk(joints=2, seconds=1.0).write(path)
-
-
-def still(path: Path) -> Path:
-    made = Making()
-    made.json["nodes"] = [{}]
-    made.view(b"mesh")
-    del made.json["animations"]
-    return made.write(path)
 
 
 def last_line(capsys: pytest.CaptureFixture[str]) -> str:
@@ -86,14 +78,16 @@ def test_links_out_of_a_folder_are_not_followed(tmp_path):
 
 
 def test_what_does_not_move_is_left_alone_in_a_folder(tmp_path, capsys):
-    still(tmp_path / "prop.glb")
+    write_still(tmp_path / "prop.glb")
+    write_body(tmp_path / "statue.bvh", moves=False)
     (tmp_path / "shots.csv").write_text("shot,artist\n010,Ann\n", encoding="utf-8")
     glb(tmp_path / "walk.glb")
     assert run(tmp_path) == 0
     said = capsys.readouterr().err
     assert f"{tmp_path / 'prop.glb'}: no animation moves a node; left alone, nothing is written" in said
     assert f"{tmp_path / 'shots.csv'}: no column has a known name (found shot, artist); left alone" in said
-    assert said.endswith("; 2 files left alone.\n")
+    assert f"{tmp_path / 'statue.bvh'}: nothing of this body moves; left alone" in said
+    assert said.endswith("; 3 files left alone.\n")
     assert run(tmp_path / "shots.csv") == 2, "by its name it is a mistake"
     assert run(tmp_path / "prop.glb", "--output", tmp_path / "small.glb") == 0, "there is nothing to be done to it"
     assert last_line(capsys) == "Nothing reduced; 1 file left alone."

@@ -3,11 +3,10 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -28,24 +27,6 @@ from rigid_motion_batch.cli import reduce
 from rigid_motion_batch.keying import gltf_files
 sys.exit(reduce.main(sys.argv[1:]))
 """
-
-
-@pytest.fixture
-def report(monkeypatch):
-    """A function that alters the reports of reduced files; it returns a list that collects the options given."""
-
-    def alter(changed: Callable[[Report], dict[str, Any]]) -> list[Options]:
-        given: list[Options] = []
-
-        def altered(document: Document, options: Options) -> Report:
-            given.append(options)
-            made = reduced(document, options)
-            return replace(made, **changed(made))
-
-        monkeypatch.setattr(gltf_files, "reduced", altered)
-        return given
-
-    return alter
 
 
 def test_no_blender_is_needed(tmp_path):
@@ -203,21 +184,27 @@ def test_what_became_of_each_input_is_printed_as_json(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out) == [printed[0] | {"state": "already written"}, *printed[1:]]
 
 
-def test_more_keys_in_fewer_bytes_are_not_called_reduced(tmp_path, report, capsys):
-    report(lambda made: {"clips": (replace(made.clips[0], before=Amount(96, 3000), after=Amount(137, 2000)),)})
+def test_more_keys_in_fewer_bytes_are_not_called_reduced(tmp_path, monkeypatch, capsys):
+    def stored(document: Document, options: Options) -> Report:
+        made = reduced(document, options)
+        return replace(made, clips=(replace(made.clips[0], before=Amount(96, 3000), after=Amount(137, 2000)),))
+
+    monkeypatch.setattr(gltf_files, "reduced", stored)
     assert run(walk(joints=2).write(tmp_path / "walk.glb")) == 0
     assert "Take0: stored in fewer bytes, 96 -> 137 keys, 3000 -> 2000 bytes, " in capsys.readouterr().err
 
 
-def test_who_reduces_again_is_told_that_errors_add_up(tmp_path, report, capsys):
-    report(lambda _: {"reduced_before": 0.005})
-    assert run(walk(joints=2).write(tmp_path / "walk.glb")) == 0
-    line = "walk.glb: reduced before within 5 mm: errors add up; reduce the original instead\n"
-    assert line in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("channels", ["needed", "all"])
-def test_which_channels_are_kept_is_what_is_asked_for(tmp_path, report, channels):
-    given = report(lambda _: {})
-    assert run(walk(joints=2).write(tmp_path / "walk.glb"), "--channels", channels) == 0
-    assert [options.channels for options in given] == [channels]
+def test_which_channels_are_kept_is_asked_for_and_who_reduces_again_is_told_that_errors_add_up(tmp_path, capsys):
+    made, again, channels = walk(joints=2), tmp_path / "again.glb", {}
+    positions = made.accessor(0.1 * np.eye(3, dtype="<f4"))
+    made.json["meshes"] = [{"primitives": [{"attributes": {"POSITION": positions}}]}]
+    made.json["nodes"][1]["mesh"] = 0
+    source = made.write(tmp_path / "walk.glb")
+    for kept in ("needed", "all"):
+        assert run(source, "--channels", kept, "--tolerance", "5mm", "--output", tmp_path / f"{kept}.glb") == 0
+        channels[kept] = len(File(tmp_path / f"{kept}.glb").json["animations"][0]["channels"])
+    assert channels["needed"] < channels["all"]
+    shutil.copy(tmp_path / "all.glb", again)
+    assert run(again, "--tolerance", "1cm") == 0
+    said = capsys.readouterr().err
+    assert "again.glb: reduced before within 5 mm: errors add up; reduce the original instead\n" in said

@@ -6,10 +6,9 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import key_frames, modes_of
+from rigid_motion.animation import key_frames
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion_batch.analysis.metrics import write_poses
-from rigid_motion_batch.recordings.clip_reading import read_source
 from tests.animation.farm import played_on_a_farm
 from tests.animation.keyed import curves_of
 from tests.scripts.baking import extension, open_again
@@ -17,10 +16,8 @@ from tests.scripts.bvh_bodies import write_body
 from tests.scripts.recordings.glbs import curved, mixed_rates
 from tests.scripts.reducing import (
     ROUNDING,
-    count_keys,
     displacement,
     heads_at,
-    joints_in_metres,
     listed,
     read_table,
     run,
@@ -28,8 +25,9 @@ from tests.scripts.reducing import (
     write_csv,
 )
 
+pytestmark = pytest.mark.any_blender
 
-@pytest.mark.any_blender
+
 @pytest.mark.parametrize("mode", ["motor_spline", "dq_sclerp"])
 def test_the_keys_of_a_recording_tell_its_motion_within_the_tolerance(tmp_path, capsys, mode):
     path = tmp_path / "hand.csv"
@@ -47,7 +45,6 @@ def test_the_keys_of_a_recording_tell_its_motion_within_the_tolerance(tmp_path, 
     assert said.out == f"{tmp_path / 'hand-keys.csv'}\n"
 
 
-@pytest.mark.any_blender
 def test_so_many_keys_of_a_recording_and_key_poses_of_a_body(tmp_path, capsys):
     path, body = tmp_path / "hand.csv", write_body(tmp_path / "body.bvh")
     times, poses = write_csv(path)
@@ -63,24 +60,6 @@ def test_so_many_keys_of_a_recording_and_key_poses_of_a_body(tmp_path, capsys):
         assert {len(key_frames(bone)) for bone in rig.pose.bones} <= {0, 9}
 
 
-@pytest.mark.parametrize("fps", [None, 30])
-def test_as_a_blend_file_it_plays_like_the_recording_in_any_blender(tmp_path, fps):
-    path = tmp_path / "hand.csv"
-    times, poses = write_csv(path)
-    assert run(path, "--tolerance", "5mm", "--blend", *(("--fps", fps) if fps else ())) == 0
-    blend, step = tmp_path / "hand-keys.blend", 1 if fps is None else 90 // fps
-    frames = np.arange(1.0, len(times[::step]) + 1.0)
-    worlds = played_on_a_farm(blend, ["hand"], frames)[1][0]
-    assert displacement(worlds, worlds_of(poses)[::step]) <= 5e-3 + ROUNDING
-    with extension():
-        open_again(blend)
-        scene, obj = bpy.context.scene, bpy.data.objects["hand"]
-        assert (scene.render.fps, scene.frame_start, scene.frame_end) == (fps or 90, 1, len(frames))
-        assert count_keys(obj) == len(read_table(tmp_path / "hand-keys.csv")[0])
-        assert set(modes_of(obj, key_frames(obj)[:-1])) == {"motor_spline"}
-
-
-@pytest.mark.any_blender
 def test_frames_are_the_samples_of_a_recording_whose_rate_is_no_whole_number(tmp_path):
     path = tmp_path / "hand.csv"
     write_csv(path, rate=29.97)
@@ -91,33 +70,6 @@ def test_frames_are_the_samples_of_a_recording_whose_rate_is_no_whole_number(tmp
     assert all(key.co.x == round(key.co.x) for key in keys)
 
 
-BY_MODE = "--mode", "motor_spline"
-
-
-@pytest.mark.parametrize("options", [(*BY_MODE, "--shared"), (), ("--curves", "--shared")])
-def test_a_whole_body_becomes_a_rig_that_plays_like_it_in_any_blender(tmp_path, capsys, options):
-    source = write_body(tmp_path / "body.bvh")
-    assert run(source, "--tolerance", "5mm", "--output", tmp_path / "keyed", *options) == 0
-    made = tmp_path / "keyed" / "body-keys.blend"
-    assert listed(made.parent) == [made.name]
-    ((clip,), _) = read_source(str(source), None)
-    shown = heads_at(made, clip.times - clip.times[0])
-    x, y, z = np.moveaxis(joints_in_metres(clip)[np.argsort(clip.rest_body.joints)], -1, 0)
-    assert 0.0 < np.linalg.norm(shown - np.stack((x, -z, y), axis=-1), axis=-1).max() <= 5e-3 + ROUNDING
-    with extension():
-        open_again(made)
-        (rig,) = bpy.data.objects
-        keyed = [bone for bone in rig.pose.bones if len(key_frames(bone))]
-        assert sum(len(key_frames(bone)) for bone in keyed) < len(keyed) * len(clip.times)
-        modes = {mode for bone in keyed for mode in modes_of(bone, key_frames(bone)[:-1])}
-        assert modes == {"motor_spline" if "--mode" in options else "BLENDER"}
-        assert len(bpy.data.actions) == 1, "the recording has the dense keys, and this file need not"
-
-    told = "curves of Blender's own, as motor_spline would leave" in capsys.readouterr().err
-    assert told == (options == ()), "which needed fewer keys is said where neither was asked for"
-
-
-@pytest.mark.any_blender
 def test_a_rigid_motion_becomes_curves_in_a_file_alone(tmp_path, capsys):
     hand = tmp_path / "hand.csv"
     write_csv(hand)
@@ -128,7 +80,6 @@ def test_a_rigid_motion_becomes_curves_in_a_file_alone(tmp_path, capsys):
     assert "what has curves becomes a .blend file: name that with --output" in capsys.readouterr().err
 
 
-@pytest.mark.any_blender
 @pytest.mark.parametrize("body", [mixed_rates(1.0), curved()], ids=["mixed rates", "curved"])
 def test_the_tolerance_holds_at_every_key_of_every_curve_and_between_them(tmp_path, capsys, body):
     source = body.write(tmp_path / "walk.glb")
@@ -145,15 +96,6 @@ def test_the_tolerance_holds_at_every_key_of_every_curve_and_between_them(tmp_pa
         assert off <= 1e-3 * float(told[1]) + more + ROUNDING
 
 
-@pytest.mark.any_blender
-def test_a_body_that_does_not_move_is_left_alone_and_nothing_is_wrong(tmp_path, capsys):
-    write_body(tmp_path / "body.bvh", moves=False)
-    assert run(tmp_path / "body.bvh") == 0
-    assert "nothing of this body moves; left alone" in capsys.readouterr().err
-    assert listed(tmp_path) == ["body.bvh"]
-
-
-@pytest.mark.any_blender
 def test_a_body_that_grows_has_its_size_in_the_table_and_in_the_file(tmp_path):
     path = tmp_path / "balloon.csv"
     times, poses = write_csv(path)
@@ -168,7 +110,6 @@ def test_a_body_that_grows_has_its_size_in_the_table_and_in_the_file(tmp_path):
     assert displacement(shown, worlds) <= 5e-3 + ROUNDING
 
 
-@pytest.mark.any_blender
 def test_one_body_of_a_file_and_all_of_them_are_files_of_their_own(tmp_path):
     source = write_body(tmp_path / "body.bvh")
     assert run(f"{source}:LeftHand", "--tolerance", "1cm") == 0
@@ -177,7 +118,6 @@ def test_one_body_of_a_file_and_all_of_them_are_files_of_their_own(tmp_path):
     assert listed(tmp_path / "all") == [f"body-{name}-keys.csv" for name in ("Head", "Hips", "LeftHand")]
 
 
-@pytest.mark.any_blender
 def test_what_is_far_away_is_refused_where_blender_could_not_hold_it(tmp_path, capsys):
     path = tmp_path / "hand.csv"
     times, poses = write_csv(path)

@@ -13,11 +13,11 @@ import pytest
 from rigid_motion_batch.cli import reduce
 from rigid_motion_batch.keying import views
 from rigid_motion_batch.report.reduced import write_reduced
-from tests.gltf.making import Making, walk
+from tests.gltf.making import walk
 from tests.gltf.player import File, eighths, off
-from tests.scripts.reducing import listed, run, write_csv
+from tests.scripts.reducing import listed, run, write_csv, write_still
 from tests.scripts.report.chromium import browser
-from tests.scripts.report.javascript import require, value_of
+from tests.scripts.report.javascript import read_by_viewer, require
 
 pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
@@ -33,15 +33,16 @@ def clips_in(page: Path) -> list[dict[str, Any]]:
 
 def played(clip: dict[str, Any]) -> dict[str, Any]:
     """Return a clip as the viewer reads it: times, errors, keys, and positions of points before and after."""
-    expression = f"""(async (clip) => {{
-        const recording = await readRecording(clip.recording), choice = await readChoice(clip.choices[0], recording);
-        const at = (motion) => [...choice.moments].map((t) => poseAt(recording, choice, t, motion, 1).places);
-        const plain = (some) => JSON.parse(JSON.stringify(some, (_, one) => ArrayBuffer.isView(one) ? [...one] : one));
-        return plain({{ times: choice.times, moments: choice.moments, before: at(null),
-            after: at(choice.motions[1]), errors: choice.motions.map((one) => one.errors[0]),
-            keys: choice.motions.map((one) => one.keys) }});
-    }})({json.dumps(clip)})"""
-    return value_of(expression, "data", "mathematics")
+    at = "[...choice.moments].map((t) => poseAt(recording, choice, t, {}, 1).places)".format
+    parts = {
+        "times": "choice.times",
+        "moments": "choice.moments",
+        "before": at("null"),
+        "after": at("choice.motions[1]"),
+        "errors": "choice.motions.map((one) => one.errors[0])",
+        "keys": "choice.motions.map((one) => one.keys)",
+    }
+    return read_by_viewer(clip, f"{{ {', '.join(f'{name}: {value}' for name, value in parts.items())} }}")
 
 
 @pytest.fixture
@@ -56,11 +57,7 @@ def folder(tmp_path: Path) -> Path:
         node["name"] = HOSTILE
     hostile.write(clips / "more" / f"{HOSTILE_FILE}.glb")
     (clips / "bad.glb").write_text("no glTF")
-    still = Making()
-    still.json["nodes"] = [{}]
-    still.view(b"mesh")
-    del still.json["animations"]
-    still.write(clips / "still.glb")
+    write_still(clips / "still.glb")
     return clips
 
 

@@ -64,8 +64,8 @@ def write_report(
     slips: Sequence[PairSlips] = (),
     overview: str = "",
     advance: Callable[[], object] = lambda: None,
-) -> list[Path]:
-    """Write one page about the given clips.
+) -> None:
+    """Write one page about the given clips; data that are too large for it go into a folder beside it, named after it.
 
     Parameters
     ----------
@@ -86,11 +86,6 @@ def write_report(
         The link to a page of more clips; empty if there is none.
     advance : callable
         Called once for every clip.
-
-    Returns
-    -------
-    list of Path
-        The page, and the data files written next to it, in a folder named after it.
 
     Raises
     ------
@@ -132,7 +127,6 @@ def write_report(
         ),
     }
     write_page(path, "page.html.j2", context)
-    return [path, *page.files]
 
 
 def write_overview(
@@ -196,7 +190,7 @@ class _Clips:
         """Names of the clips and addresses of their data files, for the script."""
         self.inside: list[str] = []
         """The clips' data, as JSON."""
-        self.files: list[Path] = []
+        self._too_large = False
         self._warned: list[tuple[str, tuple[Any, ...], float]] = []
         self._path, self._films, self._folder, self._mesh = path, films, folder, mesh
 
@@ -217,7 +211,8 @@ class _Clips:
                 self.joints.append(joints)
         self.places.append({"name": name, "data": ""})
         self.inside.append(json_in_page(clip_data(clip, own.label, self._mesh)))
-        if self.files or sum(map(len, self.inside)) > IN_THE_PAGE:
+        self._too_large |= sum(map(len, self.inside)) > IN_THE_PAGE
+        if self._too_large:
             self._move_out()
 
     def _move_out(self) -> None:
@@ -227,7 +222,6 @@ class _Clips:
             if data:
                 file = beside / f"{place + 1}.js"
                 write_text(file, f"rigidMotionClips[{place}]({data});\n")
-                self.files.append(file)
                 self.places[place]["data"] = f"{quote(beside.name)}/{file.name}"
                 self.inside[place] = ""
 

@@ -2,23 +2,19 @@ import re
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import KEYFRAME_MODES, interpolate
 from rigid_motion_batch.analysis.choices import Budget, Choice, Radii, Tolerance, Uniform, radius_in_metres, read_radii
 from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.recordings.clips import Clip
-from tests.balls import largest_displacements
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
+from tests.scripts.comparing import shell_errors
 
 
-def shell_errors(clip: Clip, keys: np.ndarray, mode: str, radius: float = 0.1) -> np.ndarray:
-    """Return the largest displacement of any point within the radius, in metres, by SciPy and singular values."""
-    shown = interpolate(clip.times[keys], clip.poses[keys], clip.times, mode)
-    matrices = [Rotation.from_quat(poses.quaternions, scalar_first=True).as_matrix() for poses in (shown, clip.poses)]
-    offsets = (shown.positions - clip.poses.positions) * clip.metres_per_unit
-    return largest_displacements(offsets, radius * (matrices[0] - matrices[1]))
+def errors_of(clip: Clip, keys: np.ndarray, mode: str) -> np.ndarray:
+    """Return the largest displacement of any point within 10 cm, in metres."""
+    return shell_errors(interpolate(clip.times[keys], clip.poses[keys], clip.times, mode), clip.poses, 0.1)
 
 
 @pytest.mark.parametrize("mode", KEYFRAME_MODES)
@@ -27,7 +23,7 @@ def test_adaptive_keys_keep_to_the_tolerance(written: str, mode: str) -> None:
     clip = swinging_clip(seconds=1.5)
     (keys,) = Tolerance(written).keys(clip, mode, 0.1)
     metres = {"2mm": 0.002, "0.5cm": 0.005, "0.03m": 0.03, "0.01": 0.01}[written]
-    assert shell_errors(clip, keys, mode).max() <= metres * (1.0 + 1e-9)
+    assert errors_of(clip, keys, mode).max() <= metres * (1.0 + 1e-9)
     assert (keys[0], keys[-1]) == (0, len(clip.times) - 1)
     assert len(keys) < 0.6 * len(clip.times)
 
@@ -38,9 +34,7 @@ def test_a_budget_is_as_many_keys_as_a_sender_at_that_rate_has_and_better_ones(s
     (keys,) = Budget(rate).keys(clip, "lerp_slerp", 0.1)
     (evenly,) = Uniform(rate).keys(clip, "lerp_slerp", 0.1)
     assert len(keys) == len(evenly) == count
-    adaptive, uniform = (
-        np.mean(shell_errors(clip, some, "lerp_slerp")[: evenly[-1] + 1] ** 2) for some in (keys, evenly)
-    )
+    adaptive, uniform = (np.mean(errors_of(clip, some, "lerp_slerp")[: evenly[-1] + 1] ** 2) for some in (keys, evenly))
     assert adaptive <= uniform
 
 

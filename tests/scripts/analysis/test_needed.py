@@ -1,7 +1,6 @@
 import csv
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,11 +14,12 @@ from rigid_motion_batch.analysis.needed import (
     evenly_spaced,
     keys_needed,
     overall,
+    part_of,
     rows_of,
 )
 from rigid_motion_batch.files import write_rows
 from rigid_motion_batch.recordings.clips import Clip
-from tests.scripts.analysis.test_choices import shell_errors
+from tests.scripts.analysis.test_choices import errors_of
 from tests.scripts.clips.recordings import swinging_clip
 
 RATES = ("30", "12", "8")
@@ -29,10 +29,6 @@ GROUPS = (("lerp_slerp",), ("dq_sclerp", "pga_slerp", "cga_slerp"), ("pga_lerp",
 
 def rms(errors: np.ndarray) -> float:
     return float(np.sqrt(np.mean(errors**2)))
-
-
-def between(clip: Clip, first: int, last: int) -> Clip:
-    return replace(clip, times=clip.times[first : last + 1], poses=clip.poses[first : last + 1])
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -56,22 +52,22 @@ def test_the_error_to_reach_is_that_of_the_reference_at_its_rate(swing: Clip, re
     assert result.groups == GROUPS
     for place, rate in enumerate(RATES):
         keys = decimate(swing.times, float(rate))
-        covered = between(swing, 0, keys[-1])
+        covered = part_of(swing, 0, keys[-1])
         assert result.reference_keys[place] == len(keys)
         assert result.durations[place] == covered.times[-1] - covered.times[0]
         for row, (mode, *_) in enumerate(GROUPS):
-            error = rms(shell_errors(covered, keys, mode))
+            error = rms(errors_of(covered, keys, mode))
             assert result.uniform_errors[row, place] == pytest.approx(error, rel=1e-9)
         assert result.targets[place] == result.uniform_errors[0, place]
 
 
 def test_evenly_spaced_keys_reach_it_and_one_segment_fewer_do_not(swing: Clip, result: KeysNeeded) -> None:
     for place, rate in enumerate(RATES):
-        covered = between(swing, 0, decimate(swing.times, float(rate))[-1])
+        covered = part_of(swing, 0, decimate(swing.times, float(rate))[-1])
         for row, (mode, *_) in list(enumerate(GROUPS))[1:]:
             segments = int(result.keys[row, 0, place]) - 1
             enough, fewer = (
-                rms(shell_errors(covered, evenly_spaced(covered, count), mode)) for count in (segments, segments - 1)
+                rms(errors_of(covered, evenly_spaced(covered, count), mode)) for count in (segments, segments - 1)
             )
             assert enough <= result.targets[place] * (1.0 + 1e-9) < fewer
             assert result.reached[row, 0, place] == pytest.approx(enough, rel=1e-9)
@@ -112,14 +108,12 @@ def test_what_takes_every_sample_is_not_reached() -> None:
     assert (overall([result]).clips[1, 0, at], overall([result]).asked[at]) == (0, 1)
 
 
-def clip_of(
-    name: str, keys: object, reference: float = 100.0, groups: object = (("lerp_slerp",), ("dq_sclerp",))
-) -> KeysNeeded:
+def clip_of(name: str, keys: object, reference: float = 100.0) -> KeysNeeded:
     """Return the result for a clip of 10 s that needs these numbers of keys, (groups, decimations), at both rates."""
     keys = np.repeat(np.array(keys, dtype=float)[..., None], 2, axis=-1)
     return KeysNeeded(
         clip=name,
-        groups=groups,
+        groups=(("lerp_slerp",), ("dq_sclerp",)),
         rates=RATES[:2],
         durations=np.full(2, 10.0),
         reference_keys=np.full(2, reference),
@@ -139,21 +133,14 @@ def test_over_all_clips_shares_and_rates_are_geometric_means() -> None:
 
 
 def test_over_all_clips_those_count_that_reached_the_error_and_it_is_known_how_many() -> None:
-    together = overall(
-        [
-            clip_of("a", [[100, 50], [100, np.inf]]),
-            clip_of("b", [[100, 25], [100, 60]]),
-            clip_of("c", np.full((2, 2), np.nan)),
-        ]
-    )
+    keys = {"a": [[100, 50], [100, np.inf]], "b": [[100, 25], [100, 60]], "c": np.full((2, 2), np.nan)}
+    together = overall([clip_of(name, own) for name, own in keys.items()])
     assert together.asked.tolist() == [2, 2]
     assert together.clips[:, 1, 0].tolist() == [2, 1]
     assert together.shares[:, 1, 0] == pytest.approx([np.sqrt(0.5 * 0.25), 0.6])
 
 
-def test_the_table_as_a_file_has_a_row_for_every_mode_and_reads_back_exactly(
-    tmp_path: Path, result: KeysNeeded
-) -> None:
+def test_the_table_as_a_file_has_a_row_for_every_mode_and_reads_back_exactly(tmp_path, result):
     never = clip_of("b", [[100, 50], [np.inf, np.nan]])
     write_rows(tmp_path / "keys_needed.csv", NeededRow, (row for clip in (result, never) for row in rows_of(clip)))
     with (tmp_path / "keys_needed.csv").open(newline="") as stream:

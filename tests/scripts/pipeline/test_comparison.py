@@ -35,19 +35,16 @@ def planned(*sources: Path, **fields: object) -> Comparison:
     return replace(comparison, **fields)
 
 
-def compared(
-    output: Path, comparison: Comparison, executor: Executor | None = None, **options: object
-) -> tuple[Run, Listener]:
+def compared(output: Path, comparison: Comparison, executor: Executor | None = None) -> tuple[Run, Listener]:
     """Run a comparison in a folder."""
     listener = Listener()
-    of_store = {name: options.pop(name) for name in ("alone", "overwrite") if name in options}
-    with Watched(output, **of_store) as store, executor or Executor() as opened:
+    with Watched(output) as store, executor or Executor() as opened:
         plan = ComparisonPlan(comparison, store)
-        outcome, notes = run(plan.reading, store, opened, progress=listener, **options), plan.inspect_clips()
+        outcome, notes = run(plan.reading, store, opened, progress=listener), plan.inspect_clips()
         listener.notes += notes
-        between = run(plan.measuring, store, opened, progress=listener, **options)
+        between = run(plan.measuring, store, opened, progress=listener)
         plan.conclude()
-        later = run(plan.tasks, store, opened, progress=listener, **options)
+        later = run(plan.tasks, store, opened, progress=listener)
         listener.made = store.made
     later.failures = outcome.failures | between.failures | later.failures
     done = between.counts[DONE]
@@ -98,9 +95,7 @@ def test_films_are_of_the_keys_that_the_verdict_speaks_of(output: Path, toss: Pa
         assert every.filmed(every.studies[0]) == [*choices]
 
 
-def test_films_of_clips_with_a_page_each_are_of_what_that_page_speaks_of(
-    output: Path, toss: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_films_of_clips_with_a_page_each_are_of_what_that_page_speaks_of(output, toss, monkeypatch):
     monkeypatch.setattr("rigid_motion_batch.pipeline.comparison.ON_ONE_PAGE", 1)
     short = write_toss(toss.with_name("short.csv"), samples=12)
     with Store(output) as store:
@@ -140,9 +135,7 @@ def test_a_whole_body_has_joints_and_films(output: Path, tmp_path: Path) -> None
     }
 
 
-def test_more_clips_than_fit_on_a_page_have_a_page_each(
-    output: Path, toss: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_more_clips_than_fit_on_a_page_have_a_page_each(output, toss, monkeypatch):
     monkeypatch.setattr("rigid_motion_batch.pipeline.comparison.ON_ONE_PAGE", 1)
     other = write_toss(toss.with_name("other.csv"), samples=50)
     outcome, _ = compared(output, planned(toss, other, about=ABOUT))
@@ -166,9 +159,7 @@ def test_a_source_that_is_given_twice_is_read_and_measured_under_two_names(outpu
         ({"axes": "unity"}, {"read toss", "measure toss/5", "measure toss/10", "metrics.csv"}),
     ],
 )
-def test_only_what_an_option_changes_is_done_again(
-    output: Path, toss: Path, change: dict[str, object], redone: set[str]
-) -> None:
+def test_only_what_an_option_changes_is_done_again(output, toss, change, redone):
     compared(output, planned(toss))
     _, listener = compared(output, planned(toss, **change))
     assert {name.replace(str(toss), "toss") for name in listener.made} == redone

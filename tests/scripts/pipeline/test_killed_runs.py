@@ -20,9 +20,7 @@ KILLED = """
 import os, sys, time
 from pathlib import Path
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
-from tests.scripts.pipeline.plans import joining, run_in, writing
-from tests.scripts.pipeline import steps
-from tests.scripts.pipeline.plans import task
+from tests.scripts.pipeline.plans import joining, run_in, task
 from tests.scripts.pipeline.steps import Write
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from rigid_motion_batch.pipeline.steps import OWN_FOLDER, Step, Task
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import Listener, contents, half_written, joining, run, run_in, states, task, writing
-from tests.scripts.pipeline.steps import Die, Fail, Join, Write
+from tests.scripts.pipeline.steps import FILE, Die, Fail, Join, Write
 
 
 class Log:
@@ -50,12 +50,6 @@ def test_an_error_that_nobody_foresaw_names_its_task_and_a_file_says_where(outpu
     run_in(output, writing("a"))
     run_in(output, writing("b"))
     assert json.loads((output / OWN_FOLDER / "failures.json").read_text()) == {}
-
-
-def test_an_error_of_the_system_names_the_file_where_it_would_have_been(output: Path) -> None:
-    names = {"x/keys.csv": "keys.csv", "x/bezier.keys.csv": "a/bezier.keys.csv"}
-    outcome = run_in(output, task("c", steps.Stumble("x/bezier.keys.csv"), publish=names))
-    assert outcome.failures["c"].startswith(f"c: {output}/a/bezier.keys.csv: ")
 
 
 def test_a_task_that_does_not_make_what_it_publishes_has_failed(output: Path) -> None:
@@ -143,16 +137,15 @@ def test_shares_are_even_and_a_task_goes_with_what_it_reads() -> None:
 
 
 def test_a_full_disk_ends_the_run_with_what_is_done_in_place(output: Path) -> None:
-    outcome = run_in(output, writing("a", "1"), task("b", Fail("full disk")), writing("c"))
+    full = task("b", Fail("full disk"), publish={f"x/{FILE}": "another.txt", FILE: "b.txt"})
+    outcome = run_in(output, writing("a", "1"), full, writing("c"))
     assert states(outcome) == {"done": 1, "failed": 1, "not begun or stopped": 1}
     assert outcome.problem == f"b: {output / 'b.txt'}: {os.strerror(28)}"
     assert contents(output) == {"a.txt": "1"}
     assert states(run_in(output, writing("a", "1"), writing("b"), writing("c"))) == {"up to date": 1, "done": 2}
 
 
-def test_a_disk_that_fills_up_while_files_are_published_ends_the_run(
-    output: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_that_fills_up_while_files_are_published_ends_the_run(output, monkeypatch):
     replace = os.replace
 
     def full(source: str, target: str) -> None:

@@ -147,9 +147,7 @@ def test_a_damaged_result_is_made_again(output: Path, damage: Callable[[Path], N
 
 @pytest.mark.parametrize("damage", DAMAGES)
 @pytest.mark.parametrize("part", ["inputs.json", "published/*.jsonl"])
-def test_whatever_becomes_of_its_records_the_work_goes_on(
-    output: Path, tmp_path: Path, damage: Callable[[Path], None], part: str
-) -> None:
+def test_whatever_becomes_of_its_records_the_work_goes_on(output, tmp_path, damage, part):
     source = tmp_path / "in.csv"
     source.write_text("1")
     copying(output, source)
@@ -193,9 +191,7 @@ def test_an_input_that_is_no_file_has_no_digest_and_is_not_waited_for(output: Pa
     assert Store(output).inputs(*sources) == dict.fromkeys(sources, "")
 
 
-def test_the_digest_of_an_input_is_kept_until_it_changes(
-    output: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_digest_of_an_input_is_kept_until_it_changes(output, tmp_path, monkeypatch):
     source = tmp_path / "in.csv"
     source.write_text("1")
     os.utime(source, (1e9, 1e9))

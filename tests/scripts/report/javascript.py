@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from rigid_motion_batch.report.data import json_in_page
 from rigid_motion_batch.report.rendering import script_of
 from tests.scripts.report import chromium
 
@@ -26,6 +27,16 @@ def value_of(expression: str, *modules: str) -> Any:
     require()
     with chromium.browser() as browser:
         return browser.run(wrapped)
+
+
+def read_by_viewer(clip: object, expression: str) -> Any:
+    """Return the value of an expression of `recording` and `choice`, which the viewer reads from a clip's data."""
+    made = f"""(async (clip) => {{
+        const recording = await readRecording(clip.recording), choice = await readChoice(clip.choices[0], recording);
+        const plain = (some) => JSON.parse(JSON.stringify(some, (_, one) => ArrayBuffer.isView(one) ? [...one] : one));
+        return plain({expression});
+    }})({json_in_page(clip)})"""
+    return value_of(made, "data", "mathematics")
 
 
 def require() -> None:

@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rigid_motion_batch.analysis.choices import EVERYWHERE, RIGID_RADIUS_M, Choice, Uniform
+from rigid_motion_batch.analysis.choices import EVERYWHERE, Choice, Uniform
 from rigid_motion_batch.analysis.modes import COMPARED
-from rigid_motion_batch.analysis.needed import Ways, keys_needed
 from rigid_motion_batch.analysis.results import ClipResult, clip_result
 from rigid_motion_batch.recordings.clips import Clip, ClipWarning
 from tests.scripts.clips.recordings import compare_clip
@@ -20,9 +19,7 @@ def result_of(
     modes: Sequence[str] = MODES,
     *,
     warnings: Sequence[ClipWarning] = (),
-    needed: bool = False,
 ) -> ClipResult:
     """Return the results of the analysis of a clip, for some choices of keys."""
     result = [compare_clip(clip, choice, modes, EVERYWHERE) for choice in choices]
-    counted = keys_needed(Ways(clip, RIGID_RADIUS_M), modes) if needed else None
-    return clip_result(replace(clip, warnings=(*clip.warnings, *warnings)), [item for item in result if item], counted)
+    return clip_result(replace(clip, warnings=(*clip.warnings, *warnings)), [item for item in result if item])

@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from rigid_motion_batch.analysis.choices import Budget, Tolerance
-from rigid_motion_batch.analysis.results import ChoiceResult
 from rigid_motion_batch.recordings.clips import ClipWarning
 from rigid_motion_batch.report import pages
 from rigid_motion_batch.report.pages import write_overview, write_report
@@ -39,20 +38,6 @@ def chromium() -> Iterator[Browser]:
         yield result
 
 
-def renamed(result: ChoiceResult) -> ChoiceResult:
-    """Return a result in which a mode has a hostile name, as a foreign motion may have."""
-    motions = [
-        replace(
-            motion,
-            modes=tuple(HOSTILE if mode == "dq_sclerp" else mode for mode in motion.modes),
-            metrics=tuple(replace(row, mode=HOSTILE) if row.mode == "dq_sclerp" else row for row in motion.metrics),
-        )
-        for motion in result.motions
-    ]
-    keys = {HOSTILE if mode == "dq_sclerp" else mode: own for mode, own in result.keys.items()}
-    return replace(result, motions=tuple(motions), keys=keys)
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with pages of all kinds."""
@@ -65,7 +50,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_report(folder / "body.html", [result_of(swinging_body(), RATES[1:2])], SETTINGS)
     write_report(folder / "adaptive.html", [result_of(swinging_clip(), (Tolerance("20mm"),))], SETTINGS)
     named = result_of(swinging_clip(), RATES[1:2], warnings=[ClipWarning(HOSTILE, HOSTILE, 101.0)])
-    named = replace(named, facts=replace(named.facts, name=HOSTILE), choices=tuple(map(renamed, named.choices)))
+    named = replace(named, facts=replace(named.facts, name=HOSTILE))
     write_report(folder / "hostile.html", [named, result_of(swinging_clip("a"), RATES[1:2])], SETTINGS)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pages, "IN_THE_PAGE", 1)
@@ -235,7 +220,7 @@ def test_the_keyboard_moves_in_time(page: Browser, folder: Path) -> None:
 
 def test_names_are_nothing_but_text(page: Browser, folder: Path) -> None:
     opened(page, folder / "hostile.html")
-    for place in (".warn a", "[name=clip]:checked + span", "#modes .chip", "#lanes div"):
+    for place in (".warn a", "[name=clip]:checked + span"):
         texts = page.run(f"[...document.querySelectorAll({place!r})].map((one) => one.textContent)")
         assert any(HOSTILE in text for text in texts), place
     assert page.run("typeof window.broken") == "undefined"

@@ -11,10 +11,10 @@ from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.results import ClipResult
 from rigid_motion_batch.recordings import read_clips
 from rigid_motion_batch.report import data
-from rigid_motion_batch.report.data import MOST_TRIANGLES, Mesh, clip_data, drill, json_in_page
+from rigid_motion_batch.report.data import MOST_TRIANGLES, Mesh, clip_data, drill
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
-from tests.scripts.report.javascript import value_of
+from tests.scripts.report.javascript import read_by_viewer
 from tests.scripts.report.runs import result_of
 
 BODIES = Path(__file__).parents[1] / "recordings" / "bodies"
@@ -23,14 +23,7 @@ TEN = (Uniform("10"),)
 
 
 def read(clip: ClipResult, expression: str) -> Any:
-    """Evaluate a JavaScript expression in which `recording` and `choice` are a clip's, as the viewer reads them."""
-    packed = json_in_page(clip_data(clip, str, drill()))
-    made = f"""(async (clip) => {{
-        const recording = await readRecording(clip.recording), choice = await readChoice(clip.choices[0], recording);
-        const plain = (some) => JSON.parse(JSON.stringify(some, (_, one) => ArrayBuffer.isView(one) ? [...one] : one));
-        return plain({expression});
-    }})({packed})"""
-    return value_of(made, "data", "mathematics")
+    return read_by_viewer(clip_data(clip, str, drill()), expression)
 
 
 def middle_of(clip: ClipResult) -> np.ndarray:

@@ -13,9 +13,7 @@ from rigid_motion_batch.report.verdict import verdict
 FIVE, TEN, TWENTY = map(Uniform, ("5", "10", "20"))
 
 
-def numbers(
-    choices: Sequence[Choice], *clips: Mapping[str, Sequence[float]], same: Sequence[tuple[str, ...]] = ()
-) -> Numbers:
+def numbers(choices: Sequence[Choice], *clips: Mapping[str, Sequence[float]]) -> Numbers:
     """Return a run with these clips' errors in mm (or keys per second within a tolerance), under each choice."""
     modes = tuple(clips[0])
     values = np.full((len(MEASURES), len(clips), len(choices), len(modes)), np.nan)
@@ -23,8 +21,7 @@ def numbers(
         for column, mode in enumerate(modes):
             for row, choice in enumerate(choices):
                 values[KEYS_AT if isinstance(choice, Tolerance) else ERROR_AT, place, row, column] = clip[mode][row]
-    together = [mode for group in same for mode in group]
-    groups = (*same, *((mode,) for mode in modes if mode not in together))
+    groups = tuple((mode,) for mode in modes)
     names = tuple(f"clip{number}" for number in range(1, len(clips) + 1))
     return Numbers(names, tuple(choices), modes, values, (frozenset({groups}),) * len(clips))
 

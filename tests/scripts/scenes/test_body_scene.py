@@ -23,8 +23,8 @@ from rigid_motion_batch.scenes.film import save_blend
 from rigid_motion_batch.scenes.physique import BONE
 from rigid_motion_batch.scenes.settings import SceneSettings
 from rigid_motion_batch.scenes.timeline import Timeline
-from tests.balls import largest_displacements
 from tests.scripts.clips.dancers import JOINTS, dancing_clip
+from tests.scripts.comparing import shell_errors
 
 BODIES = Path(__file__).parents[1] / "recordings" / "bodies"
 
@@ -34,10 +34,8 @@ RADIUS = 0.03
 RADII = np.full(len(JOINTS), RADIUS)
 
 
-def made_of(clip, modes=TWO, rate="5") -> Reconstruction:
-    made = reconstruct(clip, Uniform(rate), modes, RADIUS)
-    assert made is not None
-    return made
+def made_of(clip, modes=TWO) -> Reconstruction:
+    return reconstruct(clip, Uniform("5"), modes, RADIUS)
 
 
 def test_a_body_is_in_the_middle_of_the_film_wherever_its_root_stands() -> None:
@@ -143,8 +141,7 @@ def errors_at(made: Reconstruction, mode: str, frame: int) -> np.ndarray:
     number = int(np.searchsorted(made.clip.times, time[0] - 1e-9))
     assert made.clip.times[number] == pytest.approx(time[0])
     shown, truth = made.shown(mode, time)[:, 0], made.truth(slice(number, number + 1))[:, 0]
-    turns = [Rotation.from_quat(poses.quaternions, scalar_first=True).as_matrix() for poses in (shown, truth)]
-    return largest_displacements(shown.positions - truth.positions, RADIUS * (turns[0] - turns[1]))
+    return shell_errors(shown, truth, RADIUS)
 
 
 @pytest.mark.parametrize("skin", [False, True], ids=["solids", "skin"])

@@ -10,6 +10,7 @@ from rigid_motion_batch.report.data import MOST_TRIANGLES as MOST_IN_A_PAGE
 from rigid_motion_batch.report.data import Mesh
 from rigid_motion_batch.scenes.settings import MODELS, SubjectError
 from rigid_motion_batch.scenes.subject import MOST_TRIANGLES, load_subject, simplified, vertices_of
+from tests.animation.scenes import new_object
 
 
 def painted(picture: Path) -> bpy.types.Material:
@@ -27,21 +28,17 @@ def painted(picture: Path) -> bpy.types.Material:
 @pytest.fixture
 def user_file(tmp_path, empty_file):
     """Return a file with a cube (with modifier, material and script) under a parent of twice the size, and a lamp."""
-    cube = bpy.data.objects.new("Cube", bpy.data.meshes.new("Cube"))
-    corners = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1))).reshape(3, -1).T
-    cube.data.from_pydata(corners.tolist(), [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6)])
+    bpy.ops.mesh.primitive_cube_add(size=2.0)
+    cube = bpy.context.object
     cube.data.materials.append(painted(tmp_path / "paint.png"))
     array = cube.modifiers.new("Array", "ARRAY")
     array.use_relative_offset, array.use_constant_offset = False, True
     array.count, array.constant_offset_displace = 3, (10.0, 0.0, 0.0)
-    parent = bpy.data.objects.new("Parent", None)
-    parent.scale = (2.0, 2.0, 2.0)
-    cube.parent = parent
+    cube.parent = new_object("Parent")
+    cube.parent.scale = (2.0, 2.0, 2.0)
     cube.keyframe_insert("location", frame=1)
     bpy.data.texts.new("startup.py").use_module = True
-    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
-    for obj in (cube, parent, lamp):
-        bpy.context.scene.collection.objects.link(obj)
+    new_object("Lamp", data=bpy.data.lights.new("Lamp", "POINT"))
     path = tmp_path / "tools.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -97,9 +94,9 @@ def test_our_models_keep_their_shape_and_what_has_the_colour_of_the_mode(name):
 
 
 def test_triangles_that_hang_on_nothing_are_kept_within_the_budget(empty_file, tmp_path):
-    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Dust", bpy.data.meshes.new("Dust")))
+    made = new_object("Dust", data=bpy.data.meshes.new("Dust")).data
     dust = np.random.default_rng(1).normal(size=(3 * 2 * MOST_TRIANGLES, 3))
-    bpy.data.objects["Dust"].data.from_pydata(dust.tolist(), [], np.arange(len(dust)).reshape(-1, 3).tolist())
+    made.from_pydata(dust.tolist(), [], np.arange(len(dust)).reshape(-1, 3).tolist())
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "dust.blend"))
     result = simplified(f"{tmp_path / 'dust.blend'}:Dust")
     assert 0 < len(result["triangles"]) <= MOST_TRIANGLES

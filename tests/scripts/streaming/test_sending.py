@@ -10,40 +10,14 @@ import pytest
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import rotate
-from rigid_motion.streams import Receiver, Sender, StreamBody
-from rigid_motion.streams.paths import KnotPath as Motion
+from rigid_motion.streams.paths import KnotPath
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.bvh import _read_hierarchy
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.streaming.sending import body_of, found_held, hand_of, radii_of, samples_of
 from tests.recordings import RECORDINGS
 from tests.scripts.bvh_bodies import TIMES, write_body
-
-
-def largest_end_error(
-    body: StreamBody, times: np.ndarray, poses: Poses, ends: np.ndarray, tolerance: float, delay: float
-) -> float:
-    """Return the largest error of bone ends (joints, 3), in their joints' axes, at the samples."""
-    sender, receiver, off = Sender([body], tolerance, delay), Receiver(), [0.0]
-    truth = Motion(times, poses)
-
-    def at(local: Poses) -> np.ndarray:
-        there = body.in_root_space(local)
-        return there.positions + rotate(there.quaternions, ends)
-
-    for row, time in enumerate(times.tolist()):
-        while (due := sender.next) < time:
-            for datagram in sender.poll(due):
-                receiver.take(datagram, due)
-        for datagram in sender.add(time, poses[:, row]):
-            receiver.take(datagram, time)
-        for _, answer in receiver.answers():
-            sender.take_answer(answer, time)
-        for shown in receiver.show(time).values():
-            if shown.moment >= times[0]:
-                away = at(shown.poses[body.name]) - at(truth.pose(shown.moment))
-                off.append(float(np.linalg.norm(away, axis=1).max()))
-    return max(off)
+from tests.streams import links
 
 
 def file_end_error(path: Path, tolerance: float, delay: float = 0.1) -> float:
@@ -52,7 +26,15 @@ def file_end_error(path: Path, tolerance: float, delay: float = 0.1) -> float:
     times, poses = samples_of(clip)
     sites = np.array([joint.end or (0.0, 0.0, 0.0) for joint in _read_hierarchy(path)[0]]) * clip.metres_per_unit
     ends = to_blender(Poses(sites, np.tile((1.0, 0.0, 0.0, 0.0), (len(sites), 1))), clip.axes).positions
-    return largest_end_error(body_of(clip, poses), times, poses, ends, tolerance, delay)
+    own, truth = body_of(clip, poses), KnotPath(times, poses)
+
+    def at(local: Poses) -> np.ndarray:
+        there = own.in_root_space(local)
+        return there.positions + rotate(there.quaternions, ends)
+
+    outcome = links.run([own], times, poses, tolerance=tolerance, delay=delay)
+    away = [at(shown.poses[own.name]) - at(truth.pose(shown.moment)) for shown in outcome.shown]
+    return float(np.linalg.norm(away, axis=-1).max())
 
 
 @pytest.mark.parametrize("unit", [1.0, 100.0])

@@ -28,19 +28,9 @@ def free_udp_port() -> int:
         return tried.getsockname()[1]
 
 
-HAND = "t,x,y,z,qw,qx,qy,qz\n" + "".join(f"{0.05 * row:g},{0.1 * row:g},0,1,1,0,0,0\n" for row in range(5))
-
-
 @pytest.fixture
 def walk(tmp_path):
     return write_body(tmp_path / "walk.bvh", TIMES[:20], unit=100.0)
-
-
-@pytest.fixture
-def hand(tmp_path):
-    path = tmp_path / "hand.csv"
-    path.write_text(HAND)
-    return path
 
 
 @pytest.fixture
@@ -78,7 +68,11 @@ def test_the_command_plays_a_body_in_real_time(walk, listener):
     assert keys.poses["VMC"].positions[1, 5] == pytest.approx([x, -z, y], abs=1e-5)
 
 
-def test_a_single_body_is_a_tracker(hand, listener):
+def test_a_single_body_is_a_tracker(tmp_path, listener):
+    hand = tmp_path / "hand.csv"
+    hand.write_text(
+        "t,x,y,z,qw,qx,qy,qz\n" + "".join(f"{0.05 * row:g},{0.1 * row:g},0,1,1,0,0,0\n" for row in range(5))
+    )
     assert stream.main(["send", str(hand), "--to-vmc", f"127.0.0.1:{listener.getsockname()[1]}"]) == 0
     datagrams = received(listener)
     assert len(datagrams) == 5

@@ -19,12 +19,12 @@ def clip(name: str, times: np.ndarray, positions: np.ndarray, angles: np.ndarray
     return Clip(name, f"{name}.csv", "blender", times, Poses(positions, quaternions), ())
 
 
-def circling(name: str = "circling", turns: float = 0.0, *, rate: float = 240.0, seconds: float = 4.0) -> Clip:
+def circling(turns: float, *, rate: float, seconds: float = 4.0) -> Clip:
     """Return a body circling at 30 cm, 0.4 times per second; it rotates `turns` times as fast: 1 is a pivot."""
     times = np.arange(round(rate * seconds) + 1) / rate
     angles = 2.0 * np.pi * 0.4 * times
     positions = 0.3 * np.stack((np.cos(angles), np.sin(angles), np.zeros_like(angles)), axis=-1)
-    return clip(name, times, positions, turns * angles)
+    return clip("circling", times, positions, turns * angles)
 
 
 @cache
