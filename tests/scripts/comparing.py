@@ -2,6 +2,7 @@
 
 import csv
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -10,8 +11,7 @@ from rigid_motion.motion import Poses
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.pipeline.steps import OWN_FOLDER
 from tests.balls import largest_displacements
-
-ROOT = Path(__file__).resolve().parents[2]
+from tests.scripts.processes import ROOT, run_python
 
 COLUMNS = (
     "clip,mode,rate_hz,keys,samples,duration_s,bytes_per_s,rms_shell_m,p95_shell_m,max_shell_m,"
@@ -25,6 +25,18 @@ SMALL = ["--resolution", "160x90", "--fps", "6"]
 def run(*arguments: object) -> int:
     """Run the program in this process, which is faster for little work."""
     return compare.main(["--jobs", "0", *map(str, arguments)])
+
+
+WITHOUT_BLENDER = """
+import importlib, sys
+sys.modules["bpy"] = sys.modules["mathutils"] = None
+sys.exit(importlib.import_module("rigid_motion_batch.cli." + sys.argv[1]).main(sys.argv[2:]))
+"""
+
+
+def run_without_blender(command: str, *arguments: object) -> CompletedProcess[str]:
+    """Run any program of ours in a Python that has no Blender."""
+    return run_python("-c", WITHOUT_BLENDER, command, *arguments)
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:

@@ -14,7 +14,6 @@ from rigid_motion_batch.cli import reduce
 from rigid_motion_batch.pipeline.steps import OWN_FOLDER
 from rigid_motion_batch.recordings.clips import Clip
 from tests.animation.farm import played_on_a_farm
-from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
 from tests.balls import largest_displacements
 from tests.gltf.making import Making
@@ -104,10 +103,6 @@ def displacement(worlds: np.ndarray, truth: np.ndarray, radius: float = RADIUS) 
     """Return the farthest that any point within the radius of an object's origin is from its place, on any frame."""
     offset = (worlds - truth)[..., :3, :]
     return float(largest_displacements(offset[..., 3], radius * offset[..., :3]).max())
-
-
-def count_keys(carrier: bpy.types.Object | bpy.types.PoseBone) -> int:
-    return len(curves_of(carrier)["location", 0].keyframe_points)
 
 
 def write_csv(path: Path, seconds: float = 1.0, rate: float = 90.0) -> tuple[np.ndarray, Poses]:

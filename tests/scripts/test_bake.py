@@ -2,10 +2,7 @@
 
 import contextlib
 import json
-import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import bpy
@@ -32,10 +29,9 @@ from tests.scripts.baking import (
     save,
     with_version,
 )
+from tests.scripts.processes import ROOT, run_python
 from tests.scripts.recordings.blends import rig
 from tests.scripts.reducing import listed
-
-ROOT = Path(__file__).resolve().parents[2]
 
 PLAYED = np.arange(0.0, LAST + 1.0)
 """All frames of the scenes: from before the first key until after the last NLA strip."""
@@ -328,13 +324,8 @@ bpy.ops.preferences.addon_disable(module="bl_ext.user_default.rigid_motion")
 
 def test_an_installed_extension_steps_aside_and_is_there_again_afterwards(extension_zip, tmp_path):
     path = one_object_file(tmp_path / "shot.blend")
-    done = subprocess.run(
-        [sys.executable, "-c", BESIDE_AN_INSTALLED_EXTENSION, ROOT / "scripts" / "bake.py", extension_zip, path],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        env=os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path / "user")},
-    )
+    command = ("-c", BESIDE_AN_INSTALLED_EXTENSION, ROOT / "scripts" / "bake.py", extension_zip, path)
+    done = run_python(*command, BLENDER_USER_RESOURCES=str(tmp_path / "user"))
     assert done.returncode == 0, done.stdout + done.stderr
     assert json.loads(done.stdout.splitlines()[-1]) == {"code": 0, "as before": True}
     assert "1 object baked.\n" in done.stderr

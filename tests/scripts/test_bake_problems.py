@@ -12,10 +12,8 @@ import pytest
 from rigid_motion_batch import supervising
 from tests.full_disk import disk_full_after
 from tests.scripts.baking import baked_name, frames_of_keys, one_object_file, open_again, run, with_version
+from tests.scripts.processes import ROOT, run_python
 from tests.scripts.reducing import listed
-
-ROOT = Path(__file__).resolve().parents[2]
-COMMAND = [sys.executable, ROOT / "scripts" / "bake.py"]
 
 PR_CAPBSET_DROP, CAPABILITIES = 24, (1, 2)
 """See prctl(2) and capabilities(7): the capabilities by which root on Linux ignores file permissions."""
@@ -29,7 +27,8 @@ def run_without_privileges(*arguments: object) -> subprocess.CompletedProcess[st
             for capability in CAPABILITIES:
                 ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, capability, 0, 0, 0)
 
-    return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=60, preexec_fn=give_up)
+    line = [sys.executable, ROOT / "scripts" / "bake.py", *arguments]
+    return subprocess.run(line, capture_output=True, text=True, timeout=60, preexec_fn=give_up)
 
 
 def cut(path: Path) -> None:
@@ -148,7 +147,5 @@ def test_ctrl_c_while_blender_is_loaded_ends_it_at_once(tmp_path):
     beside.mkdir()
     in_the_place_of_blender = "import signal, time\nsignal.raise_signal(signal.SIGINT)\ntime.sleep(30)\n"
     (beside / "bpy.py").write_text(in_the_place_of_blender)
-    done = subprocess.run(
-        [*COMMAND, path], capture_output=True, text=True, timeout=60, env=os.environ | {"PYTHONPATH": str(beside)}
-    )
+    done = run_python(ROOT / "scripts" / "bake.py", path, PYTHONPATH=str(beside))
     assert (done.returncode, done.stdout, done.stderr) == (130, "", f"{supervising.STOPPED_TEXT}\n")

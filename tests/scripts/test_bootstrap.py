@@ -1,9 +1,6 @@
 """Tests of bootstrap.py: the packages that it installs, and its messages if it cannot."""
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -14,25 +11,21 @@ from rigid_motion_batch.recordings.gltf import ENDINGS
 from rigid_motion_batch.recordings.reading import JSON, TEXT
 from rigid_motion_batch.system_libraries import DEBIAN, way_out
 from scripts import bootstrap
+from tests.scripts.processes import ROOT, run_python
 
-ROOT = Path(__file__).resolve().parents[2]
-
-
-def run(*arguments: str) -> subprocess.CompletedProcess:
-    command = [sys.executable, ROOT / "scripts" / "bootstrap.py", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60)
+BOOTSTRAP = ROOT / "scripts" / "bootstrap.py"
 
 
 @pytest.mark.parametrize("arguments", [(), ("--help",), ("-h",)])
 def test_help_shows_the_commands(arguments):
-    done = run(*arguments)
+    done = run_python(BOOTSTRAP, *arguments)
     assert done.returncode == 0
     for command in bootstrap.COMMANDS:
         assert f"bootstrap.py {command}" in done.stdout
 
 
 def test_an_unknown_command_is_refused_with_the_known_ones():
-    done = run("compair")
+    done = run_python(BOOTSTRAP, "compair")
     assert done.returncode == 2
     assert "did you mean compare?" in done.stderr
     assert all(command in done.stderr for command in bootstrap.COMMANDS)
@@ -40,7 +33,7 @@ def test_an_unknown_command_is_refused_with_the_known_ones():
 
 @pytest.mark.parametrize("given", [["--blender", "2.79"], ["--blender"]])
 def test_a_blender_that_does_not_fit_the_python_is_refused(given):
-    done = run("test", *given)
+    done = run_python(BOOTSTRAP, "test", *given)
     assert done.returncode == 2
     assert bootstrap._project()["tool"]["rigid-motion"]["blender"][bootstrap.PYTHON][0] in done.stderr
 
@@ -98,8 +91,7 @@ for command in COMMANDS:
 
 
 def test_commands_say_what_they_do_where_there_is_no_blender():
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    done = subprocess.run([sys.executable, "-c", HELPS], capture_output=True, text=True, timeout=60, env=environment)
+    done = run_python("-c", HELPS)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.count("usage: ") >= len(COMMANDS)
 

@@ -6,9 +6,7 @@ https://developer.blender.org/docs/features/extensions/, and Blender's manual, "
 
 import ast
 import json
-import os
 import re
-import subprocess
 import sys
 import tomllib
 import zipfile
@@ -18,6 +16,7 @@ import pytest
 
 from rigid_motion_batch.cli import build_extension
 from rigid_motion_batch.places import EXTENSION, LICENSE, MANIFEST
+from tests.scripts.processes import run_python
 
 LIFE_OF_AN_EXTENSION = """
 import importlib, json, pkgutil, sys
@@ -58,11 +57,6 @@ print(json.dumps(seen))
 """
 
 
-def run(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess:
-    command = [sys.executable, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, env=os.environ | environment)
-
-
 def test_the_zip_holds_the_modules_the_manifest_and_the_licence_as_they_are_and_nothing_else(extension_zip):
     sources = {path.name: path for path in (MANIFEST, LICENSE)}
     for kind in ("*.py", "*.po", "*.json"):
@@ -92,7 +86,7 @@ def test_it_installs_enables_disables_and_uninstalls_without_a_word_of_complaint
     script = tmp_path / "life.py"
     script.write_text(LIFE_OF_AN_EXTENSION, encoding="utf-8")
     user = tmp_path / "user"
-    done = run(script, extension_zip, BLENDER_USER_RESOURCES=str(user))
+    done = run_python(script, extension_zip, BLENDER_USER_RESOURCES=str(user))
     assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
     seen = json.loads(done.stdout.strip().splitlines()[-1])
     installed = user / "extensions" / "user_default" / "rigid_motion"

@@ -2,8 +2,6 @@
 
 import json
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +10,7 @@ from rigid_motion_batch.cli import compare, job_bundle
 from rigid_motion_batch.cli.job_bundle import below_inputs, write_bundle
 from rigid_motion_batch.pipeline.steps import VERSION_VARIABLE, version_here
 from tests.scripts.comparing import outputs, write_toss
+from tests.scripts.processes import run_python
 
 OPTIONS = ("--rates", "5", "--modes", "lerp_slerp,motor_spline", "--no-video")
 
@@ -27,7 +26,7 @@ def test_one_bad_clip_is_named_and_the_others_get_their_report(clip, tmp_path, c
     given = ["takes/toss.csv", "takes/bad.csv", *OPTIONS, "--jobs", "0", "--parts", "1"]
     assert job_bundle.main([*given, "--bundle", "bundle", "--output", "out"]) == 0
     command = shlex.split(capfd.readouterr().out.splitlines()[-1])
-    ran = subprocess.run([sys.executable, "-m", *command], capture_output=True, text=True, timeout=240)
+    ran = run_python("-m", *command)
     said = ran.stdout + ran.stderr
     assert ran.returncode != 0, said
     assert "bad.csv:1: no column has a known name" in said

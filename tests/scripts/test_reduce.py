@@ -8,14 +8,12 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion_batch.keying import blend_files, recordings
-from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
-from tests.scripts.baking import extension, open_again, save
+from tests.scripts.baking import extension, frames_of_keys, open_again, save
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.reducing import (
     FRAMES,
     ROUNDING,
-    count_keys,
     displacement,
     listed,
     object_file,
@@ -52,10 +50,7 @@ def test_key_poses_are_few_and_on_the_same_frames_for_all_bones(tmp_path, capsys
     assert run(path, "--shared") == 0
     assert "(12 mm allowed)" in capsys.readouterr().err
     open_again(reduced_name(path))
-    frames = [
-        [point.co.x for point in curves_of(bone)["location", 0].keyframe_points]
-        for bone in bpy.data.objects["Rig"].pose.bones
-    ]
+    frames = [frames_of_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones]
     assert frames[0] == frames[1] == frames[2]
     assert len(frames[0]) < len(FRAMES)
 
@@ -94,7 +89,7 @@ def test_without_a_tolerance_a_rig_of_any_size_begins_with_one_that_fits_it(tmp_
     save(path)
     assert run(path) == 0
     open_again(reduced_name(path))
-    assert sum(count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones) < 3 * len(FRAMES) / 2
+    assert sum(len(frames_of_keys(bone)) for bone in bpy.data.objects["Rig"].pose.bones) < 3 * len(FRAMES) / 2
 
 
 def test_a_dry_run_says_all_also_as_json_and_writes_nothing(tmp_path, capsys):

@@ -1,7 +1,6 @@
 """Tests of reduce.py on folders and many files: selection of files, parallel processes, and repeated runs."""
 
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -11,8 +10,8 @@ import pytest
 from rigid_motion_batch.cli import reduce
 from tests.gltf.making import walk
 from tests.scripts.bvh_bodies import write_body
+from tests.scripts.processes import ROOT, run_python, start
 from tests.scripts.reducing import listed, object_file, run, write_csv, write_still
-from tests.scripts.stopping import ROOT, start
 
 pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
@@ -187,8 +186,7 @@ def test_processes_do_the_same_as_one_and_a_bad_file_stops_nobody(tmp_path):
     (tmp_path / "in" / "bad.glb").write_bytes(b"glTF, but no more")
     write_csv(tmp_path / "in" / "hand.csv")
     assert run(tmp_path / "in", "--output", tmp_path / "one") == 1
-    command = [sys.executable, ROOT / "scripts" / "reduce.py", "in", "--output", "two", "--jobs", "2"]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120)
+    done = run_python(ROOT / "scripts" / "reduce.py", "in", "--output", "two", "--jobs", "2", cwd=tmp_path)
     assert done.returncode == 1
     made = ["a-reduced.glb", "b-reduced.glb", "c-reduced.glb", "d-reduced.glb", "hand-keys.csv"]
     assert done.stdout.splitlines() == [str(Path("two", name)) for name in made]

@@ -1,11 +1,8 @@
 """Tests of `reduce.py` on glTF files: it returns them with fewer keys, otherwise unchanged, and without Blender."""
 
 import json
-import os
 import re
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -16,24 +13,15 @@ from rigid_motion.gltf.rewriting import Amount
 from rigid_motion_batch.keying import gltf_files
 from tests.gltf.making import Making, walk
 from tests.gltf.player import File, off
+from tests.scripts.comparing import run_without_blender
 from tests.scripts.reducing import listed, run, write_csv
 
 pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
-WITHOUT_BLENDER = """
-import sys
-sys.modules["bpy"] = None
-from rigid_motion_batch.cli import reduce
-from rigid_motion_batch.keying import gltf_files
-sys.exit(reduce.main(sys.argv[1:]))
-"""
-
 
 def test_no_blender_is_needed(tmp_path):
     source = walk().write(tmp_path / "walk.glb")
-    command = [sys.executable, "-c", WITHOUT_BLENDER, str(source), "--tolerance", "2mm", "--radius", "0.03"]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment)
+    done = run_without_blender("reduce", source, "--tolerance", "2mm", "--radius", "0.03")
     made = tmp_path / "walk-reduced.glb"
     assert (done.returncode, done.stdout) == (0, f"{made}\n")
     told = re.search(
@@ -53,8 +41,7 @@ def test_no_blender_is_needed(tmp_path):
     last = rf"1 clip reduced, \d\d \d\d\d to {size} bytes; at most {worst}\."
     assert re.fullmatch(last, done.stderr.splitlines()[-1])
     write_csv(tmp_path / "hand.csv")
-    command = [sys.executable, "-c", WITHOUT_BLENDER, tmp_path / "hand.csv"]
-    assert subprocess.run(command, timeout=120, env=environment).returncode == 0, "nor for tables"
+    assert run_without_blender("reduce", tmp_path / "hand.csv").returncode == 0, "nor for tables"
     assert (tmp_path / "hand-keys.csv").exists()
 
 

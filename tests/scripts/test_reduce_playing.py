@@ -7,12 +7,11 @@ import pytest
 from rigid_motion.animation import key_frames, modes_of
 from rigid_motion_batch.recordings.clip_reading import read_source
 from tests.animation.farm import played_on_a_farm
-from tests.scripts.baking import extension, open_again
+from tests.scripts.baking import extension, frames_of_keys, open_again
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.reducing import (
     FRAMES,
     ROUNDING,
-    count_keys,
     displacement,
     heads_at,
     joints_in_metres,
@@ -39,7 +38,7 @@ def test_an_object_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_p
     with extension():
         open_again(reduced_name(path))
         tool = bpy.data.objects["Tool"]
-        assert 2 < count_keys(tool) < len(FRAMES) / 2
+        assert 2 < len(frames_of_keys(tool)) < len(FRAMES) / 2
         assert set(modes_of(tool, key_frames(tool)[:-1])) == {mode}
 
 
@@ -52,7 +51,7 @@ def test_a_rig_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_path,
     # The end of a bone is as far from its head as its radius.
     assert 0.0 < displacement(played(reduced_name(path), *probes), played(path, *probes), 0.0) <= 5e-3 + ROUNDING
     open_again(reduced_name(path))
-    counts = [count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones]
+    counts = [len(frames_of_keys(bone)) for bone in bpy.data.objects["Rig"].pose.bones]
     assert sum(counts) < 3 * len(FRAMES) / 2
     assert f"Rig: 3 bones reduced, {3 * len(FRAMES)} -> {sum(counts)} keys" in capsys.readouterr().err
 
@@ -70,7 +69,7 @@ def test_as_a_blend_file_it_plays_like_the_recording_in_any_blender(tmp_path, fp
         open_again(blend)
         scene, obj = bpy.context.scene, bpy.data.objects["hand"]
         assert (scene.render.fps, scene.frame_start, scene.frame_end) == (fps or 90, 1, len(frames))
-        assert count_keys(obj) == len(read_table(tmp_path / "hand-keys.csv")[0])
+        assert len(frames_of_keys(obj)) == len(read_table(tmp_path / "hand-keys.csv")[0])
         assert set(modes_of(obj, key_frames(obj)[:-1])) == {"motor_spline"}
 
 

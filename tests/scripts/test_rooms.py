@@ -1,9 +1,10 @@
 """Tests of imports: the packages that a worker in Blender uses may import only NumPy and Blender's modules."""
 
-import subprocess
 import sys
 
 import pytest
+
+from tests.scripts.processes import run_python
 
 IMPORTING = """
 import importlib, pkgutil, sys
@@ -23,7 +24,8 @@ def imported(room: str) -> tuple[set[str], set[str]]:
     """Return the packages outside Python that all modules of a package import, and the parts of the batch half."""
     bpy = "" if room == "analysis" else "import bpy"
     code = IMPORTING.format(room=room, bpy=bpy)
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    result = run_python("-c", code)
+    assert result.returncode == 0, result.stderr
     packages, parts = (set(line.split()) for line in result.stdout.strip().splitlines()[-2:])
     return packages - set(sys.stdlib_module_names), parts
 

@@ -10,8 +10,8 @@ import pytest
 from rigid_motion_batch import supervising
 from rigid_motion_batch.recordings import importing
 from tests.scripts.baking import one_object_file
+from tests.scripts.processes import CRASH, alive, descendants, start
 from tests.scripts.reducing import listed, write_csv
-from tests.scripts.stopping import CRASH, alive, descendants, start
 
 SOON = 5.0
 """Allowed seconds until a stopped command ends: on an idle machine it takes 1.3."""

@@ -19,7 +19,7 @@ from rigid_motion_batch.pipeline.steps import OWN_FOLDER, RunError, Task
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline.plans import Listener, contents, half_written, run, states, task, writing
 from tests.scripts.pipeline.steps import Save
-from tests.scripts.stopping import alive, descendants
+from tests.scripts.processes import alive, descendants
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +17,7 @@ from rigid_motion_batch.pipeline.studies import Comparison
 from rigid_motion_batch.report.settings import PageSettings
 from rigid_motion_batch.scenes.settings import SceneSettings
 from tests.scripts.bvh_bodies import TIMES, write_body
-from tests.scripts.comparing import outputs, write_toss
+from tests.scripts.comparing import outputs, run_without_blender, write_toss
 from tests.scripts.pipeline.plans import Listener, Watched, run
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -187,19 +185,9 @@ def test_a_clip_takes_two_kilobytes_at_most_between_two_plans(output: Path, toss
     assert all(isinstance(task, Task) for task in plan.tasks())
 
 
-WITHOUT = """
-import sys
-
-sys.modules["bpy"] = sys.modules["mathutils"] = None
-from rigid_motion_batch.cli import compare
-
-sys.exit(compare.main(sys.argv[1:]))
-"""
-
-
 def test_numbers_and_pages_need_no_blender(output: Path, toss: Path) -> None:
     options = ("--no-video", "--tolerance", "2cm", "--modes", "lerp_slerp", "--jobs", "0", "--output", output)
-    ended = subprocess.run([sys.executable, "-c", WITHOUT, toss, *options], capture_output=True, text=True)
+    ended = run_without_blender("compare", toss, *options)
     assert ended.returncode == 0, ended.stderr
     assert {"metrics.csv", "keys_needed.csv", "report.html"} <= {*outputs(output)}
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from tests.scripts.pipeline.plans import contents, half_written
-from tests.scripts.stopping import alive, descendants
+from tests.scripts.processes import alive, descendants, run_python
 from tests.thoroughness import THOROUGH
 
 KILLED = """
@@ -24,42 +21,28 @@ from tests.scripts.pipeline.plans import joining, run_in, task
 from tests.scripts.pipeline.steps import Write
 
 if __name__ == "__main__":
-    tasks = [task(str(n), Write(str(n), seconds=float(sys.argv[2]))) for n in range(20)]
+    tasks = [task(str(n), Write(str(n), seconds=0.05)) for n in range(20)]
     run_in(Path(sys.argv[1]), *tasks, joining("all", *tasks), executor=ProcessExecutor(2))
 """
 
-MOMENTS = int(os.environ.get("RIGID_MOTION_KILLS", "10" if THOROUGH else "5"))
-
-
-@contextmanager
-def started(folder: Path, output: Path, seconds: float) -> Iterator[subprocess.Popen]:
-    (folder / "killed.py").write_text(KILLED)
-    process = subprocess.Popen([sys.executable, folder / "killed.py", output, str(seconds)])
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.wait()
+MOMENTS = 10 if THOROUGH else 5
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux shows them")
 def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(output: Path, tmp_path: Path) -> None:
     expected = {f"{n}.txt": f"{n}" for n in range(20)} | {"all.txt": "".join(f"{n}" for n in range(20))}
-    results = 0
+    (tmp_path / "killed.py").write_text(KILLED)
+    command, results = [sys.executable, tmp_path / "killed.py", output], 0
     for number in range(MOMENTS):
-        with started(tmp_path, output, 0.05) as process:
+        with subprocess.Popen(command) as process:
             ends = time.monotonic() + 30.0
-            while (
-                len(list(output.glob("*.txt"))) <= min(results, 20)
-                and time.monotonic() < ends
-                and process.poll() is None
-            ):
+            while len(list(output.glob("*.txt"))) <= min(results, 20) and process.poll() is None:
+                assert time.monotonic() < ends
                 time.sleep(0.01)
             time.sleep(0.01 * (number % 5))
             workers = descendants(process.pid)
             process.kill()
-            process.wait()
         result = contents(output)
         results = len(result)
         assert result.items() <= expected.items()
@@ -67,7 +50,6 @@ def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(output
         while any(map(alive, workers)) and time.monotonic() < ends:
             time.sleep(0.01)
         assert not any(map(alive, workers))
-    with started(tmp_path, output, 0.05) as process:
-        assert process.wait(60) == 0
+    assert run_python(*command[1:]).returncode == 0
     assert contents(output) == expected
     assert half_written(output) == []

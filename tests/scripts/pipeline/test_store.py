@@ -19,8 +19,6 @@ from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import contents, joining, run, run_in, states, task, writing
 from tests.scripts.pipeline.steps import FILE, Write
 
-ROOT = Path(__file__).resolve().parents[3]
-
 
 def whole() -> tuple[Task, Task, Task]:
     first, second = writing("a", "1"), writing("b", "2")

@@ -14,6 +14,8 @@ from typing import Any
 NAMES = ("chromium", "chromium-headless-shell", "chromium-browser", "google-chrome")
 PROGRAM = next((path for name in NAMES if (path := shutil.which(name))), None)
 
+NOISE = "GL Driver Message"
+"""A message of the console about drawing without a graphics card."""
 
 PATIENCE = 90.0
 """Maximum seconds to wait for an answer."""
@@ -68,7 +70,8 @@ class Browser:
         elif event == "Runtime.consoleAPICalled" and details["type"] in ("error", "warning", "assert"):
             self.problems.append(str(details["args"])[:600])
         elif event == "Log.entryAdded" and details["entry"]["level"] in ("error", "warning"):
-            self.problems.append(f"{details['entry']['text']} {details['entry'].get('url', '')}")
+            if NOISE not in details["entry"]["text"]:
+                self.problems.append(f"{details['entry']['text']} {details['entry'].get('url', '')}")
         elif event == "Network.requestWillBeSent":
             self.requests.append(details["request"]["url"])
         elif event == "Page.loadEventFired":

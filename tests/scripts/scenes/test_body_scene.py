@@ -31,7 +31,6 @@ BODIES = Path(__file__).parents[1] / "recordings" / "bodies"
 SETTINGS = SceneSettings(resolution=(160, 90), fps=24)
 TWO = ("lerp_slerp", "motor_spline")
 RADIUS = 0.03
-RADII = np.full(len(JOINTS), RADIUS)
 
 
 def made_of(clip, modes=TWO) -> Reconstruction:

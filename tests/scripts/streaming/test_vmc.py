@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import socket
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -13,10 +11,10 @@ import pytest
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Receiver, Sender, StreamBody
 from rigid_motion_batch.cli import stream
-from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.streaming.vmc import ToVmc
 from tests.live.performing import BODY, TIMES_OF_A_SECOND, dance, frames_of_vmc, in_world
 from tests.scripts.bvh_bodies import TIMES, hips_at, write_body
+from tests.scripts.processes import ROOT, run_python
 from tests.scripts.streaming.test_rooms import LOOPBACK_ADDRESS, PATIENCE, free_port, running
 
 pytestmark = [pytest.mark.blender, pytest.mark.network, pytest.mark.any_blender]
@@ -51,8 +49,8 @@ def received(other: socket.socket) -> list[bytes]:
 
 
 def test_the_command_plays_a_body_in_real_time(walk, listener):
-    command = [sys.executable, str(CHECKOUT / "scripts" / "stream.py"), "send", str(walk), "--to-vmc"]
-    done = subprocess.run([*command, f"127.0.0.1:{listener.getsockname()[1]}"], capture_output=True, text=True)
+    place = f"127.0.0.1:{listener.getsockname()[1]}"
+    done = run_python(ROOT / "scripts" / "stream.py", "send", walk, "--to-vmc", place)
     assert done.returncode == 0, done.stderr
     datagrams = received(listener)
     assert f"datagrams: {len(datagrams)}" in done.stdout

@@ -1,4 +1,4 @@
-"""Helpers for tests of stopped commands: starting a command that gets stuck where Python cannot interrupt it."""
+"""Helpers for tests of processes: running Python, and starting a command that gets stuck in a call."""
 
 import os
 import subprocess
@@ -9,6 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+
+
+def run_python(*arguments: object, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run Python with further variables of the environment, and return its exit code and outputs."""
+    line, variables = [sys.executable, *map(str, arguments)], os.environ | environment
+    return subprocess.run(line, capture_output=True, text=True, timeout=240, cwd=cwd, env=variables)
+
 
 STUCK = """
 import ctypes, io, os, pathlib, signal
