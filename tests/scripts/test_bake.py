@@ -15,7 +15,7 @@ from rigid_motion.animation.actions.marks import MAX_MARK, write_marks
 from rigid_motion_batch.keying import jobs
 from tests.animation.farm import played_on_a_farm
 from tests.animation.keyed import curves_of, snapshot
-from tests.animation.oracle import shown_worlds
+from tests.animation.oracle import expected_worlds, shown_worlds
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
 from tests.scripts.baking import (
     LAST,
@@ -95,6 +95,7 @@ def fill_shot() -> None:
         write_marks(curve, np.array([MAX_MARK, 0, 0, 0]))
     curves_of(refused["Huge"])["location", 0].keyframe_points[1].co_ui.y = 3e38
     set_mode(key(new_object("Stale"), seed=10), "dq_sclerp")
+    # From here on nothing follows what is edited.
     animation.set_enabled(False)
     for point in curves_of(bpy.data.objects["Stale"])["location", 0].keyframe_points:
         point.co_ui.y *= -2.0
@@ -164,6 +165,8 @@ def test_a_baked_file_plays_in_any_blender_as_the_live_one_does_with_the_extensi
     opened_there, shown_there, *_ = played_on_a_farm(baked, names, PLAYED)
     assert_same(opened_there, opened)
     assert_same(shown_there, shown)
+    expected = expected_worlds(bpy.data.objects["Stale"], PLAYED[:43])
+    assert_same(shown_there[names.index("Stale"), None, :43], [expected])
 
 
 def test_un_baking_gives_back_exactly_the_keys_and_the_motion(shot, baked, tmp_path):

@@ -1,7 +1,5 @@
 """Tests of written files and rows: complete or not there, and safe in spreadsheets."""
 
-from __future__ import annotations
-
 import csv
 import os
 from dataclasses import dataclass

@@ -7,7 +7,6 @@ from importlib import import_module
 
 import pytest
 
-from rigid_motion.motion import MODES
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.command_line import as_typed, own_arguments
 from tests.scripts.comparing import ROOT, run
@@ -128,13 +127,6 @@ def test_of_a_command_with_very_many_inputs_the_first_are_told_and_every_option(
 )
 def test_the_same_amount_written_in_two_ways_is_one_choice(arguments, folders):
     assert [choice.name for choice in compare.parse(arguments).choices] == folders
-
-
-def test_the_help_names_every_mode_there_is(capsys):
-    with pytest.raises(SystemExit):
-        run("--help")
-    said = " ".join(capsys.readouterr().out.partition("--modes MODE")[2].partition("--output")[0].split())
-    assert [mode for mode in (*MODES, "all") if mode not in said] == []
 
 
 EXAMPLE = re.compile(r"^ +python scripts/(?:compare\.py|bootstrap\.py compare)(?P<arguments>.*)$", re.MULTILINE)

@@ -1,7 +1,5 @@
 """Helpers to run plans of the steps in `steps`, and to inspect the results."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager

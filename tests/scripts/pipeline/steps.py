@@ -1,7 +1,5 @@
 """Steps for tests of the pipeline, with effects that can be seen from outside, in files."""
 
-from __future__ import annotations
-
 import errno
 import os
 import signal

@@ -1,7 +1,5 @@
 """Tests of steps run by a Blender program, named by `BLENDER`; otherwise by a stand-in, a Python with bpy."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

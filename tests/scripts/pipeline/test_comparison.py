@@ -1,7 +1,5 @@
 """Tests of a comparison as a plan: its results, and which tasks run again after a change."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Random histories of an output folder: plans change, files are edited, deleted and damaged, and runs catch up."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from tempfile import mkdtemp

@@ -1,7 +1,5 @@
 """Tests of killed runs and workers: finished results stay, and the next run completes the work."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time

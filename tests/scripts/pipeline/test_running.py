@@ -1,7 +1,5 @@
 """Tests of runs of plans: with any executor, in separate processes, and if one dies."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """Tests of the output folder: foreign files are never replaced, damage and changed code are noticed."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Tests of converting values to JSON and arrays, and back."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
 from pathlib import Path

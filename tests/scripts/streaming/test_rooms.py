@@ -1,7 +1,5 @@
 """Tests of rooms with real processes and Zenoh over loopback: users see what others send, strangers are shut out."""
 
-from __future__ import annotations
-
 import json
 import re
 import select

@@ -1,7 +1,5 @@
 """Tests of streaming recordings: bodies, and the radius around each joint within which the tolerance holds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

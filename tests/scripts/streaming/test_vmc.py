@@ -1,7 +1,5 @@
 """Tests of playing recordings and streams as VMC, and of receiving VMC as streams."""
 
-from __future__ import annotations
-
 import socket
 import time
 
