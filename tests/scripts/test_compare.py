@@ -33,28 +33,10 @@ from tests.scripts.comparing import (
 
 pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
-ADAPTIVE = ("--no-video", "--tolerance", "5mm, 0.02", "--rates", "10", "--modes", "lerp_slerp,motor_spline")
-
 
 @pytest.fixture(scope="module")
 def short_clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_toss(tmp_path_factory.mktemp("clips") / "toss.csv", samples=91)
-
-
-@pytest.fixture(scope="module")
-def adaptive(short_clip: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The output for one second of an asset, with evenly spaced and with adaptive keys."""
-    output = tmp_path_factory.mktemp("adaptive")
-    assert run(short_clip, "--output", output, *ADAPTIVE) == 0
-    return output
-
-
-@pytest.fixture(scope="module")
-def measured(tmp_path_factory) -> Path:
-    """The output of the main job on the assets, without videos."""
-    output = tmp_path_factory.mktemp("measured")
-    assert run("--no-video", "--output", output, "--rates", "5,20") == 0
-    return output
 
 
 def recordings_in_assets() -> dict[str, dict[str, np.ndarray]]:
@@ -80,15 +62,16 @@ def errors_of(filled: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> di
     }
 
 
-def test_every_number_can_be_had_again_from_the_tables_and_the_recording(measured):
-    rows = rows_of(measured / "metrics.csv")
+def test_every_number_can_be_had_again_from_the_tables_and_the_recording(tmp_path):
+    assert run("--no-video", "--output", tmp_path, "--rates", "5,20") == 0
+    rows = rows_of(tmp_path / "metrics.csv")
     clips = recordings_in_assets()
     expected = [(clip, rate, mode) for clip in clips for rate in ("5", "20") for mode in COMPARED]
     assert sorted((row["clip"], row["rate_hz"], row["mode"]) for row in rows) == sorted(expected)
-    assert (measured / "metrics.csv").read_text().splitlines()[0] == COLUMNS
+    assert (tmp_path / "metrics.csv").read_text().splitlines()[0] == COLUMNS
     for row in rows:
         recording = clips[row["clip"]]
-        folder = measured / row["clip"] / row["rate_hz"]
+        folder = tmp_path / row["clip"] / row["rate_hz"]
         filled, keys = table(folder / f"{row['mode']}.csv"), table(folder / "keys.csv")
         compared = (recording["t"] >= keys["t"][0]) & (recording["t"] <= keys["t"][-1])
         truth = {name: column[compared] for name, column in recording.items()}
@@ -205,10 +188,12 @@ def test_ctrl_c_while_rendering_leaves_a_report_and_no_half_video(tmp_path):
     assert not list(tmp_path.rglob("*.mp4"))
 
 
-def test_workers_write_what_one_process_writes_to_the_byte(short_clip, adaptive, tmp_path, capfd):
-    assert compare.main([str(short_clip), "--output", str(tmp_path), *ADAPTIVE, "--jobs", "2"]) == 0
-    assert outputs(tmp_path) == outputs(adaptive)
-    assert capfd.readouterr().out.splitlines()[-1] == str(tmp_path / "report.html")
+def test_workers_write_what_one_process_writes_to_the_byte(short_clip, tmp_path, capfd):
+    adaptive = ("--no-video", "--tolerance", "5mm, 0.02", "--rates", "10", "--modes", "lerp_slerp,motor_spline")
+    assert run(short_clip, *adaptive, "--output", tmp_path / "one") == 0
+    assert compare.main([str(short_clip), *adaptive, "--output", str(tmp_path / "two"), "--jobs", "2"]) == 0
+    assert outputs(tmp_path / "two") == outputs(tmp_path / "one")
+    assert capfd.readouterr().out.splitlines()[-1] == str(tmp_path / "two" / "report.html")
 
 
 def test_one_bad_recording_is_said_and_the_others_go_on(short_clip, tmp_path, capsys):

@@ -36,14 +36,6 @@ def mine(toss: Path) -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
-def compared(toss: Path, mine: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    output = tmp_path_factory.mktemp("output")
-    options = (*FAST, "--tolerance", "1cm", "--modes", "lerp_slerp,motor_spline")
-    assert run(toss, "--against", mine, *options, "--output", output) == 0
-    return output
-
-
 def by_scipy(mine: Path, times: np.ndarray) -> tuple[np.ndarray, Rotation]:
     """Return positions on straight lines between the samples of a table, and rotations by SLERP."""
     own = table(mine)
@@ -51,14 +43,16 @@ def by_scipy(mine: Path, times: np.ndarray) -> tuple[np.ndarray, Rotation]:
     return np.stack([np.interp(times, own["t"], own[name]) for name in "xyz"], axis=-1), turns(times)
 
 
-def test_its_numbers_are_those_of_straight_lines_and_slerp_between_its_samples(toss, mine, compared):
+def test_its_numbers_are_those_of_straight_lines_and_slerp_between_its_samples(toss, mine, tmp_path):
+    options = (*FAST, "--tolerance", "1cm", "--modes", "lerp_slerp,motor_spline")
+    assert run(toss, "--against", mine, *options, "--output", tmp_path) == 0
     recording, own = table(toss), table(mine)
-    rows = {(row["rate_hz"], row["mode"]): row for row in rows_of(compared / "metrics.csv")}
+    rows = {(row["rate_hz"], row["mode"]): row for row in rows_of(tmp_path / "metrics.csv")}
     common = (recording["t"] >= own["t"][0]) & (recording["t"] <= own["t"][-1])
     assert 0 < common.sum() < len(common)
     for rate, folder in (("10", "10"), ("", "tolerance-1cm")):
         row, keys = rows[rate, "mine"], rows[rate, "lerp_slerp"]
-        filled = table(compared / "toss" / folder / "mine.csv")
+        filled = table(tmp_path / "toss" / folder / "mine.csv")
         assert np.isin(filled["t"], recording["t"][common]).all()
         assert len(filled["t"]) == int(row["samples"]) == int(keys["samples"])
         if not rate:

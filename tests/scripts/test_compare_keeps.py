@@ -86,15 +86,6 @@ def test_the_same_recordings_and_more_of_them_go_on(folder: Path, arguments: tup
     assert run(*arguments, "--output", "out") == 0
 
 
-@pytest.fixture
-def free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder to work in, with only a recording."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(places, "CHECKOUT", None)
-    write_toss(tmp_path / "toss.csv")
-    return tmp_path
-
-
 def printed(capsys: pytest.CaptureFixture, *arguments: object) -> str:
     """Return the name of the report's folder that a quiet run prints."""
     capsys.readouterr()
@@ -103,14 +94,17 @@ def printed(capsys: pytest.CaptureFixture, *arguments: object) -> str:
     return Path(line).parent.name
 
 
-def test_without_a_folder_every_comparison_has_one_of_its_own(free: Path, capsys: pytest.CaptureFixture) -> None:
-    write_toss(free / "hand.csv", samples=70)
-    write_toss(free / "other" / "toss.csv", samples=80)
+def test_without_a_folder_every_comparison_has_one_of_its_own(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(places, "CHECKOUT", None)
+    write_toss(tmp_path / "toss.csv")
+    write_toss(tmp_path / "hand.csv", samples=70)
+    write_toss(tmp_path / "other" / "toss.csv", samples=80)
     assert printed(capsys, "toss.csv") == "toss"
     assert printed(capsys, "hand.csv", "toss.csv") == "hand"
     assert printed(capsys, "other/toss.csv") == "toss-2"
     assert printed(capsys, "toss.csv") == "toss"
-    (free / "renders" / "toss-3").mkdir()
-    (free / "renders" / "toss-3" / "mine.txt").touch()
-    write_toss(free / "third" / "toss.csv", samples=90)
+    (tmp_path / "renders" / "toss-3").mkdir()
+    (tmp_path / "renders" / "toss-3" / "mine.txt").touch()
+    write_toss(tmp_path / "third" / "toss.csv", samples=90)
     assert printed(capsys, "third/toss.csv") == "toss-4"

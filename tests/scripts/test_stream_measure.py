@@ -8,6 +8,7 @@ import pytest
 
 from research.live_streams.packings import packed, smallest_three
 from rigid_motion_batch.cli.stream import main
+from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 from tests.scripts.bvh_bodies import write_body
@@ -38,7 +39,7 @@ def test_a_body(walk: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -
 
 
 def test_a_single_body_with_loss(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    source, shown = Path(__file__).parents[2] / "assets/reach.csv", tmp_path / "shown.csv"
+    source, shown = ASSETS / "reach.csv", tmp_path / "shown.csv"
     options = ["--radius", "0.1", "--loss", "0.05", "--json"]
     assert main(["measure", str(source), "--output", str(shown), *options]) == 0
     result = json.loads(capfd.readouterr().out)
@@ -46,7 +47,7 @@ def test_a_single_body_with_loss(tmp_path: Path, capfd: pytest.CaptureFixture[st
     assert len(read_clips([str(shown)])[0][0].times) == len(read_clips([str(source)])[0][0].times)
 
 
-HOLD = ["measure", str(Path(__file__).parents[2] / "assets/hold.csv") + ":*", "--radius", "10cm"]
+HOLD = ["measure", f"{ASSETS / 'hold.csv'}:*", "--radius", "10cm"]
 
 
 def test_a_tool_slips_least_in_the_space_of_the_hand(capfd: pytest.CaptureFixture[str]) -> None:

@@ -10,14 +10,6 @@ from research.pages import QUOTE, ROOT, environment, filled, pages, write_figure
 TEMPLATES = environment()
 
 
-@pytest.fixture
-def checkout(tmp_path: Path) -> Path:
-    """Return a checkout without pages."""
-    for folder in ("docs/figures", "docs/templates"):
-        (tmp_path / folder).mkdir(parents=True)
-    return tmp_path
-
-
 @pytest.mark.parametrize("path", pages(), ids=lambda path: path.name)
 def test_every_page_has_the_figures_of_the_studies(path: Path):
     assert path.read_text(encoding="utf-8") == filled(path, TEMPLATES), "run python scripts/research pages"
@@ -39,21 +31,23 @@ def test_every_template_and_every_file_of_figures_is_used():
         assert re.search(rf"\b{path.stem}\b[.[]", used), path.name
 
 
-def test_a_page_is_its_template_with_figures(checkout: Path):
-    write_figures("found", {"error": 0.01234, "saved": {"a": 0.031, "b": -0.2}}, "x", checkout)
-    (checkout / "docs/templates/page.md").write_text(
+def test_a_page_is_its_template_with_figures(tmp_path: Path):
+    for folder in ("docs/figures", "docs/templates"):
+        (tmp_path / folder).mkdir(parents=True)
+    write_figures("found", {"error": 0.01234, "saved": {"a": 0.031, "b": -0.2}}, "x", tmp_path)
+    (tmp_path / "docs/templates/page.md").write_text(
         "{% for name, share in found.saved.items() %}\n{{ name }}: {{ share | less }}\n{% endfor %}\n", encoding="utf-8"
     )
-    (checkout / "docs/templates/quotes.md").write_text(
+    (tmp_path / "docs/templates/quotes.md").write_text(
         "{% macro rows() %}{{ [found.error, 1.0] | each('{:.1f}', 100) | join(' | ') }}{% endmacro %}", encoding="utf-8"
     )
-    (checkout / "README.md").write_text(
+    (tmp_path / "README.md").write_text(
         "It is <!--= found.error | digits(2) -->9<!-- end -->, <!--= quotes.rows() --><!-- end -->", encoding="utf-8"
     )
-    templates = environment(checkout)
+    templates = environment(tmp_path)
     assert (
-        filled(checkout / "docs/page.md", templates) == "a: 3\N{NO-BREAK SPACE}% less\nb: 20\N{NO-BREAK SPACE}% more\n"
+        filled(tmp_path / "docs/page.md", templates) == "a: 3\N{NO-BREAK SPACE}% less\nb: 20\N{NO-BREAK SPACE}% more\n"
     )
-    assert filled(checkout / "README.md", templates) == (
+    assert filled(tmp_path / "README.md", templates) == (
         "It is <!--= found.error | digits(2) -->0.012<!-- end -->, <!--= quotes.rows() -->1.2 | 100.0<!-- end -->"
     )

@@ -1,15 +1,13 @@
 """Generated clips with known results, and the throw of the assets."""
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
 from rigid_motion.motion import Poses
+from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-
-ASSETS = Path(__file__).resolve().parents[4] / "assets"
 
 
 def clip(name: str, times: np.ndarray, positions: np.ndarray, angles: np.ndarray) -> Clip:
