@@ -24,3 +24,9 @@ def largest_displacements(offsets: np.ndarray, turns: np.ndarray) -> np.ndarray:
         middle = np.take_along_axis(angles, np.argmax(reached(angles), axis=0)[None], axis=0)[0]
         width /= 8.0
     return reached(middle)
+
+
+def displaced(one: np.ndarray, other: np.ndarray, radius: float) -> np.ndarray:
+    """Return how far any point of a ball moves from one matrix (..., 4, 4) to the other, shape (...)."""
+    off = one - other
+    return largest_displacements(off[..., :3, 3], radius * off[..., :3, :3])

@@ -11,9 +11,9 @@ from mathutils import Euler, Matrix, Quaternion, Vector
 
 from rigid_motion.animation import set_mode
 from tests.animation.bones.rigs import new_rig
+from tests.animation.held import in_holder, worlds
 from tests.animation.keyed import Carrier, curves_of, rotation_path
 from tests.animation.scenes import key, new_object, random_values, write
-from tests.balls import largest_displacements
 
 KEYS = (1.0, 11.0, 24.0, 40.0)
 OFFSET_KEYS = (1.0, 15.0, 33.0)
@@ -86,18 +86,9 @@ def key_influence(obj: bpy.types.Object, *points: tuple[float, float]) -> None:
 
 def seen(carrier: Carrier, frames: np.ndarray = FRAMES) -> np.ndarray:
     """Return displayed matrices, (m, 4, 4): objects in the world, bones relative to their parent bone or the rig."""
-    scene, result = bpy.context.scene, []
-    for frame in frames:
-        scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
-        shown = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        if isinstance(carrier, bpy.types.Object):
-            result.append(np.array(shown.matrix_world))
-        else:
-            bone = shown.pose.bones[carrier.name]
-            parent = Matrix() if bone.parent is None else bone.parent.matrix
-            result.append(np.array(parent.inverted() @ bone.matrix))
-    scene.frame_set(1)
-    return np.array(result)
+    if isinstance(carrier, bpy.types.Object):
+        return worlds(carrier, frames)
+    return in_holder(carrier, carrier.parent or carrier.id_data, frames)
 
 
 def offsets(carrier: Carrier, frames: np.ndarray = FRAMES) -> np.ndarray:
@@ -119,9 +110,3 @@ def offsets(carrier: Carrier, frames: np.ndarray = FRAMES) -> np.ndarray:
             turn = Euler(np.array(numbers) * power, order).to_quaternion()
         result.append(np.array(Matrix.LocRotScale(place, turn, None)))
     return np.array(result)
-
-
-def displaced(one: np.ndarray, other: np.ndarray, radius: float) -> np.ndarray:
-    """Return how far any point of a ball moves from one matrix (m, 4, 4) to the other, shape (m,)."""
-    off = one - other
-    return largest_displacements(off[:, :3, 3], radius * off[:, :3, :3])

@@ -25,7 +25,7 @@ from rigid_motion.animation import (
 from tests.animation.held import KINDS, new_prop, put, wander, worlds
 from tests.animation.keyed import Carrier, curves_of, rotation_path, snapshot
 from tests.animation.scenes import new_object, write
-from tests.balls import largest_displacements
+from tests.balls import displaced
 from tests.rigs.recorded import FRAMES, recorded_rig
 
 RADIUS, TOLERANCE = 0.1, 0.001
@@ -33,12 +33,6 @@ NOISE = 1e-4
 
 GRIP = np.array(Matrix.LocRotScale((0.02, 0.1, 0.03), Quaternion((0.9, 0.2, 0.3, 0.1)).normalized(), None))
 OTHER = np.array(Matrix.LocRotScale((0.05, 0.08, -0.02), Quaternion((0.3, -0.2, 0.8, 0.4)).normalized(), None))
-
-
-def off(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return the largest distance of any point within the radius between two sets of matrices, on each frame."""
-    apart = one - other
-    return largest_displacements(apart[:, :3, 3], RADIUS * apart[:, :3, :3])
 
 
 def record(prop: Carrier, places: np.ndarray, frames: np.ndarray = FRAMES) -> None:
@@ -98,7 +92,7 @@ def test_what_hands_held_gets_a_key_for_each_time_and_is_shown_within_the_tolera
     inside = (right.first <= FRAMES) & (left.last >= FRAMES)
     assert key_frames(prop).tolist() == sorted({*FRAMES[~inside], right.first, 40.0})
     assert holders_on(prop, (19, 21, 39, 40, 59, 61)) == ["", "Hand.R", "Hand.R", "Hand.L", "Hand.L", ""]
-    error = off(worlds(prop), before)
+    error = displaced(worlds(prop), before, RADIUS)
     assert error[~inside].max() < 1e-5
     largest = max(left.largest, right.largest)
     assert largest == pytest.approx(error[inside].max(), abs=2e-6)
@@ -135,7 +129,7 @@ def test_all_rigs_are_looked_at_and_those_segments_that_are_wanted_are_done(live
     assert held_segments(prop, tolerance=TOLERANCE, radius=RADIUS) == [left]
     reduce_into_holds(prop, tolerance=TOLERANCE, radius=RADIUS)
     assert holders_on(prop, (20, 30, 50, 61)) == ["", "Hand.R", "Hand.L", ""]
-    assert off(worlds(prop), moved()).max() <= TOLERANCE
+    assert displaced(worlds(prop), moved(), RADIUS).max() <= TOLERANCE
     restore_keys(prop)
     assert key_frames(prop).tolist() == FRAMES.tolist()
 
@@ -167,7 +161,7 @@ def test_of_bones_that_do_not_move_against_one_another_the_nearest_holds(live_fi
     assert (found.name, found.first, found.last) == ("Hand.R", 1.0, 90.0)
     reduce_into_holds(prop, [body], TOLERANCE, RADIUS)
     assert key_frames(prop).tolist() == [1.0]
-    assert off(worlds(prop), worlds(body.pose.bones["Hand.R"], FRAMES) @ GRIP).max() < 1e-5
+    assert displaced(worlds(prop), worlds(body.pose.bones["Hand.R"], FRAMES) @ GRIP, RADIUS).max() < 1e-5
 
 
 def test_objects_hold_too_but_not_those_that_follow_it(live_file):
@@ -194,7 +188,7 @@ def test_what_was_held_and_baked_to_the_world_is_held_again(live_file):
     # After its last key the tool rests.
     assert (found.name, found.first, found.last) == ("Hand.R", 21.0, 61.0)
     reduce_into_holds(prop, [body], 1e-4, RADIUS)
-    assert off(worlds(prop), before).max() < 1e-5
+    assert displaced(worlds(prop), before, RADIUS).max() < 1e-5
 
 
 def far_apart() -> Carrier:

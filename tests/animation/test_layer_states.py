@@ -14,9 +14,11 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 from rigid_motion import animation
 from rigid_motion.animation import Refused, add_layer, merge_layer, radius_of, set_mode
+from tests.animation.held import in_holder, worlds
 from tests.animation.keyed import MODE_IDS, Carrier, curves_of, rotation_path
-from tests.animation.layered import displaced, key_base, new, offsets, seen
+from tests.animation.layered import key_base, new, offsets, seen
 from tests.animation.machine import SETTINGS, Edit, seeds, shares
+from tests.balls import displaced
 from tests.blank import blank
 from tests.thoroughness import THOROUGH
 
@@ -62,18 +64,9 @@ class Layering(RuleBasedStateMachine):
 
     def _below(self) -> np.ndarray:
         """Return the Empty's matrices, relative to the same parent as those of `seen`."""
-        result, scene = [], bpy.context.scene
-        for frame in FRAMES:
-            scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
-            depsgraph = bpy.context.evaluated_depsgraph_get()
-            world = self.base.evaluated_get(depsgraph).matrix_world
-            if self.kind != "child":
-                rig, parent = self.tool.id_data.evaluated_get(depsgraph), self.tool.parent
-                hangs_on = rig.matrix_world @ rig.pose.bones[parent.name].matrix if parent else rig.matrix_world
-                world = hangs_on.inverted() @ world
-            result.append(np.array(world))
-        scene.frame_set(1)
-        return np.array(result)
+        if self.kind == "child":
+            return worlds(self.base, FRAMES)
+        return in_holder(self.base, self.tool.parent or self.tool.id_data, FRAMES)
 
     def _start_history(self) -> None:
         bpy.ops.ed.undo_push(message="Begin")

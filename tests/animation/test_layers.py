@@ -17,7 +17,6 @@ from tests.animation.layered import (
     KEYS,
     KINDS,
     OFFSET_KEYS,
-    displaced,
     key_base,
     key_influence,
     key_offset,
@@ -26,6 +25,7 @@ from tests.animation.layered import (
     seen,
 )
 from tests.animation.scenes import key, linked, new_object, push_down
+from tests.balls import displaced
 
 PRECISION = 1e-5
 QUATERNION_PRECISION = 1e-3

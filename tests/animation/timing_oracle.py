@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import lru_cache
 
 import bpy
 import numpy as np
+
+from tests.animation.modified import spare_fcurve
 
 Curves = dict[tuple[str, int], bpy.types.FCurve]
 """F-curves with keys, by data path and index."""
@@ -32,7 +32,7 @@ def _progress_of_spin(curves: Curves, first: float, last: float, frames: np.ndar
     The spare curve has the keys of the first channel, with flat handles.
     """
     like = next(iter(curves.values()))
-    with spare_curve() as fcurve:
+    with spare_fcurve() as fcurve:
         fcurve.extrapolation = like.extrapolation
         fcurve.keyframe_points.add(len(like.keyframe_points))
         for number, (made, key) in enumerate(zip(fcurve.keyframe_points, like.keyframe_points, strict=True)):
@@ -46,15 +46,6 @@ def _progress_of_spin(curves: Curves, first: float, last: float, frames: np.ndar
         share = (frames - first) / (last - first)
         return share if like.extrapolation == "LINEAR" else np.clip(share, 0.0, 1.0)
     return (np.array(values) - begin) / (end - begin)
-
-
-@contextmanager
-def spare_curve() -> Iterator[bpy.types.FCurve]:
-    """Yield an F-curve of an unused Action."""
-    action = bpy.data.actions.new("Timing")
-    strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
-    yield strip.channelbag(action.slots.new("OBJECT", "Timing"), ensure=True).fcurves.new("location")
-    bpy.data.actions.remove(action)
 
 
 def evaluated(fcurve: bpy.types.FCurve, frame: float) -> float:
