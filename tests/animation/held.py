@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion
 
-from rigid_motion.animation import hold_in, refresh, set_mode
+from rigid_motion.animation import hold_facts, hold_in, refresh, set_mode
 from tests.animation.bones.rigs import HANDS, Rest, key_all, new_rig
 from tests.animation.keyed import Carrier, rotation_path
 from tests.animation.oracle import shown_worlds
@@ -27,6 +27,16 @@ def worlds(carrier: Carrier, frames: Sequence[float] = PLAYED) -> np.ndarray:
 def in_holder(prop: Carrier, holder: Carrier, frames: Sequence[float]) -> np.ndarray:
     """Return a prop's matrices relative to its holder."""
     return np.linalg.inv(worlds(holder, frames)) @ worlds(prop, frames)
+
+
+def holders_on(prop: Carrier, frames: Sequence[int]) -> list[str]:
+    """Return the names of a prop's holders on frames, empty where nothing holds it."""
+    result = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        now = hold_facts(prop).now
+        result.append("" if now is None else now.name)
+    return result
 
 
 def new_prop(kind: str) -> Carrier:

@@ -14,7 +14,6 @@ from rigid_motion.animation import (
     Refused,
     bake_to_world,
     held_segments,
-    hold_facts,
     hold_in,
     key_frames,
     reduce_into_holds,
@@ -22,7 +21,7 @@ from rigid_motion.animation import (
     restore_keys,
     set_mode,
 )
-from tests.animation.held import KINDS, new_prop, put, wander, worlds
+from tests.animation.held import KINDS, holders_on, new_prop, put, wander, worlds
 from tests.animation.keyed import Carrier, curves_of, rotation_path, snapshot
 from tests.animation.scenes import new_object, write
 from tests.balls import displaced
@@ -62,15 +61,6 @@ def moved(seed: int = 0, noise: float = NOISE, pick: int = 20, put_down: int = 6
     places = np.where((number < over)[:, None, None], right[held], left[held])
     places[:, :3, 3] += np.random.default_rng(seed).uniform(-noise, noise, (len(FRAMES), 3))
     return places
-
-
-def holders_on(prop: Carrier, frames: tuple[int, ...]) -> list[str]:
-    result = []
-    for frame in frames:
-        bpy.context.scene.frame_set(frame)
-        now = hold_facts(prop).now
-        result.append("" if now is None else now.name)
-    return result
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -16,7 +16,7 @@ from rigid_motion.animation.actions.modifiers import set_settings
 from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curves_of, rotation_path, snapshot
 from tests.animation.oracle import shown_worlds
-from tests.animation.scenes import key, key_densely, new_object
+from tests.animation.scenes import give_own_deltas, key, key_densely, new_object
 
 PLAYED, IN_ROUNDS = np.arange(1.0, 40.0, 0.25), np.arange(-60.0, 120.0, 0.5)
 RANGE = {"use_restricted_range": True, "frame_start": 7.0, "frame_end": 31.0, "blend_in": 5.0}
@@ -65,6 +65,8 @@ def some_of(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
 def test_a_modifier_acts_on_what_is_seen(live_file, what, how):
     order, when = how
     obj, dense = (key(new_object(name, order), seed=4, scale="even") for name in ("Tool", "Dense"))
+    for moved in (obj, dense):
+        give_own_deltas(moved)
     keys, in_rounds = snapshot(obj), when.endswith("rounds")
     modifiers = [MODIFIERS[name] for name in what.split(", then ")]
     set_mode(dense, "cga_slerp")
