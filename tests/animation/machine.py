@@ -224,9 +224,12 @@ class Machine(RuleBasedStateMachine):
         self._restore_remembered_names()
 
     def _restore_remembered_names(self) -> None:
-        keyed, names, before_bake = self.history[self.place]
+        _, names, before_bake = state = self.history[self.place]
         self.names, self.before_bake = names.copy(), before_bake.copy()
-        assert self._keyed() == keyed
+        self._assert_as_in(state)
+
+    def _assert_as_in(self, state: tuple[dict, list, dict]) -> None:
+        assert self._keyed() == state[0]
 
     @precondition(lambda self: self.on and self.before_bake)
     @rule(who=shares)
@@ -243,11 +246,11 @@ class Machine(RuleBasedStateMachine):
 
     @rule()
     def save_and_reload(self):
-        keyed = self._keyed()
+        before = self._current_state()
         path = str(Path(self.folder.name) / "scene.blend")
         bpy.ops.wm.save_as_mainfile(filepath=path, compress=False)
         bpy.ops.wm.open_mainfile(filepath=path)
-        assert self._keyed() == keyed
+        self._assert_as_in(before)
         self._start_history()
 
     @while_on()

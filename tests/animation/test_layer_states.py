@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
-from pathlib import Path
 
 import bpy
 import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+from hypothesis.stateful import initialize, invariant, precondition, rule
 
-from rigid_motion import animation
 from rigid_motion.animation import Refused, add_layer, merge_layer, radius_of, set_mode
 from tests.animation.held import in_holder, worlds
 from tests.animation.keyed import MODE_IDS, Carrier, curves_of, rotation_path
 from tests.animation.layered import key_base, new, offsets, seen
-from tests.animation.machine import SETTINGS, Edit, seeds, shares
+from tests.animation.machine import SETTINGS, Machine, Name, seeds, shares, while_on
 from tests.balls import displaced
-from tests.blank import blank
 from tests.thoroughness import THOROUGH
 
 FRAMES = np.arange(-3.0, 46.0, 1.625)
@@ -28,22 +24,13 @@ PRECISION = 2e-5
 TOLERANCE = 0.01
 
 
-class Layering(RuleBasedStateMachine):
+def while_layered(**given: st.SearchStrategy) -> Callable:
+    """Return a decorator for a rule that applies only to a layer, while the extension is on."""
+    return lambda step: precondition(lambda self: self.base is not None)(while_on(**given)(step))
+
+
+class Layering(Machine):
     """An animator at work on an object or a bone, on the offset of its layer, and on the Empty below."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        blank()
-        bpy.utils.register_class(Edit)
-        animation.register()
-        self.folder = tempfile.TemporaryDirectory()
-        self.history: list[np.ndarray] = []
-        self.place = -1
-
-    def teardown(self) -> None:
-        animation.unregister()
-        bpy.utils.unregister_class(Edit)
-        self.folder.cleanup()
 
     @initialize(kind=st.sampled_from(("child", "root", "bone")), mode=st.sampled_from(MODE_IDS))
     def begin(self, kind, mode):
@@ -68,36 +55,39 @@ class Layering(RuleBasedStateMachine):
             return worlds(self.base, FRAMES)
         return in_holder(self.base, self.tool.parent or self.tool.id_data, FRAMES)
 
-    def _start_history(self) -> None:
-        bpy.ops.ed.undo_push(message="Begin")
-        self.history, self.place = [seen(self.tool, FRAMES)], 0
+    def _current_state(self) -> tuple[dict, list, dict]:
+        return {"Tool": seen(self.tool, FRAMES)}, [], {}
 
-    def _edit(self, change: Callable[[], None]) -> None:
-        Edit.change = change
-        bpy.ops.test.edit("EXEC_DEFAULT", True)
-        bpy.context.view_layer.update()
-        self.history[self.place + 1 :] = [seen(self.tool, FRAMES)]
-        self.place += 1
+    def _assert_as_in(self, state: tuple[dict, list, dict]) -> None:
+        self._assert_seen_as(state[0]["Tool"])
 
+    def _assert_seen_as(self, expected: np.ndarray) -> None:
+        error = np.abs(seen(self.tool, FRAMES) - expected).max()
+        assert error < PRECISION * max(1.0, np.abs(expected).max()), f"it is off by {error}"
+
+    def _play(self) -> dict[Name, np.ndarray]:
+        return {"Tool": seen(self.tool, FRAMES)}
+
+    @precondition(lambda self: self.on and self.history and self.base is not None)
     @invariant()
-    def it_is_seen_where_the_motion_below_and_the_offset_say(self):
-        if self.history and self.base is not None:
-            strip = self.tool.id_data.animation_data.nla_tracks["Rigid Motion Layer"].strips[0]
-            # Outside its strip, a layer keeps its values at the ends of the strip.
-            expected = self._below() @ offsets(self.tool, np.clip(FRAMES, strip.frame_start, strip.frame_end))
-            error = np.abs(seen(self.tool, FRAMES) - expected).max()
-            assert error < PRECISION * max(1.0, np.abs(expected).max()), f"it is off by {error}"
+    def everything_is_where_it_has_to_be(self):
+        """It is where the motion below and the offset say.
 
-    @precondition(lambda self: self.base is None)
+        Outside its strip, a layer keeps its values at the ends of the strip.
+        """
+        strip = self.tool.id_data.animation_data.nla_tracks["Rigid Motion Layer"].strips[0]
+        frames = np.clip(FRAMES, strip.frame_start, strip.frame_end)
+        self._assert_seen_as(self._below() @ offsets(self.tool, frames))
+
+    @precondition(lambda self: self.on and self.base is None)
     @rule(frame=st.integers(-5, 45))
     def add(self, frame):
         before = seen(self.tool, FRAMES)
         bpy.context.scene.frame_set(frame)
         self._edit(lambda: add_layer(self.tool))
-        assert np.abs(seen(self.tool, FRAMES) - before).max() < PRECISION * max(1.0, np.abs(before).max())
+        self._assert_seen_as(before)
 
-    @precondition(lambda self: self.base is not None)
-    @rule()
+    @while_layered()
     def merge(self):
         before = seen(self.tool, WHOLE)
         refused: list[Refused] = []
@@ -113,8 +103,7 @@ class Layering(RuleBasedStateMachine):
         off = displaced(seen(self.tool, WHOLE), before, radius_of(self.tool))[inside].max(initial=0.0)
         assert off < TOLERANCE + 1e-4, f"merged it is off by {off}"
 
-    @precondition(lambda self: self.base is not None)
-    @rule(frame=st.integers(-3, 44), seed=seeds, below=st.booleans())
+    @while_layered(frame=st.integers(-3, 44), seed=seeds, below=st.booleans())
     def pose_and_key(self, frame, seed, below):
         def change() -> None:
             random, carrier = np.random.default_rng(seed), self.base if below else self.tool
@@ -126,8 +115,9 @@ class Layering(RuleBasedStateMachine):
 
         self._edit(change)
 
-    @precondition(lambda self: self.base is not None)
-    @rule(which=shares, below=st.booleans(), by=st.sampled_from((-3.0, 0.5, 2.0)), how=st.sampled_from(("move", "set")))
+    @while_layered(
+        which=shares, below=st.booleans(), by=st.sampled_from((-3.0, 0.5, 2.0)), how=st.sampled_from(("move", "set"))
+    )
     def edit_a_key(self, which, below, by, how):
         curves = [*curves_of(self.base if below else self.tool).values()]
         curves = [curve for curve in curves if curve.keyframe_points]
@@ -143,13 +133,11 @@ class Layering(RuleBasedStateMachine):
 
         self._edit(change)
 
-    @precondition(lambda self: self.base is not None)
-    @rule(mode=st.sampled_from(MODE_IDS), below=st.booleans())
+    @while_layered(mode=st.sampled_from(MODE_IDS), below=st.booleans())
     def choose_a_mode(self, mode, below):
         self._edit(lambda: set_mode(self.base if below else self.tool, mode))
 
-    @precondition(lambda self: self.base is not None)
-    @rule(frame=st.integers(1, 40), influence=st.floats(0.0, 1.0))
+    @while_layered(frame=st.integers(1, 40), influence=st.floats(0.0, 1.0))
     def key_the_influence(self, frame, influence):
         def change() -> None:
             strip = self.tool.id_data.animation_data.nla_tracks["Rigid Motion Layer"].strips[0]
@@ -158,48 +146,21 @@ class Layering(RuleBasedStateMachine):
 
         self._edit(change)
 
-    @precondition(lambda self: self.base is not None)
-    @rule(seed=seeds)
+    @while_layered(seed=seeds)
     def rename_the_empty(self, seed):
         self._edit(lambda: setattr(self.base, "name", f"Below {seed}"))
 
-    @precondition(lambda self: self.base is not None)
-    @rule()
+    @while_layered()
     def leave_the_strip_and_enter_it_again(self):
         data, before = self.tool.id_data.animation_data, seen(self.tool, FRAMES)
 
         def change() -> None:
             data.use_tweak_mode = False
             bpy.context.view_layer.update()
-            assert np.abs(seen(self.tool, FRAMES) - before).max() < PRECISION * max(1.0, np.abs(before).max())
+            self._assert_seen_as(before)
             data.use_tweak_mode = True
 
         self._edit(change)
-
-    @rule()
-    def save_and_open(self):
-        before, path = seen(self.tool, FRAMES), str(Path(self.folder.name) / "layer.blend")
-        bpy.ops.wm.save_as_mainfile(filepath=path, compress=False)
-        bpy.ops.wm.open_mainfile(filepath=path)
-        assert np.abs(seen(self.tool, FRAMES) - before).max() < PRECISION * max(1.0, np.abs(before).max())
-        self._start_history()
-
-    @rule(steps=st.integers(-4, 4))
-    def undo_or_redo(self, steps):
-        place = min(max(self.place + steps, 0), len(self.history) - 1)
-        for _ in range(abs(place - self.place)):
-            assert (bpy.ops.ed.undo if steps < 0 else bpy.ops.ed.redo)() == {"FINISHED"}
-        self.place, expected = place, self.history[place]
-        assert np.abs(seen(self.tool, FRAMES) - expected).max() < PRECISION * max(1.0, np.abs(expected).max())
-
-    @rule()
-    def play_without_the_extension(self):
-        before = seen(self.tool, FRAMES)
-        animation.unregister()
-        try:
-            assert np.abs(seen(self.tool, FRAMES) - before).max() < PRECISION * max(1.0, np.abs(before).max())
-        finally:
-            animation.register()
 
 
 Layering.TestCase.settings = settings(SETTINGS, max_examples=12 if THOROUGH else 3, stateful_step_count=20)
