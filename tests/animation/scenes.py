@@ -156,6 +156,14 @@ def linked(library: Path, name: str) -> bpy.types.Object:
     return obj
 
 
+def put_into_library(obj: bpy.types.Object) -> bpy.types.Object:
+    """Write an object to another file, and return it linked from there."""
+    library, name = Path(bpy.app.tempdir) / "library.blend", obj.name
+    bpy.data.libraries.write(str(library), {obj})
+    bpy.data.objects.remove(obj)
+    return linked(library, name)
+
+
 @contextmanager
 def enabled(*addons: str) -> Iterator[None]:
     """Switch on Blender's own add-ons of these names within the block. Those that were off are off again afterwards."""

@@ -35,7 +35,7 @@ from tests.animation.bones.rigs import ARM, in_turn, key_all, new_rig
 from tests.animation.held import KINDS, handled, new_hands, new_prop, worlds
 from tests.animation.keyed import Carrier, curves_of, rotation_path, snapshot
 from tests.animation.oracle import shown_worlds
-from tests.animation.scenes import key, linked, new_object
+from tests.animation.scenes import key, new_object, put_into_library
 from tests.balls import displaced, largest_displacements
 from tests.world_poses import read_poses
 
@@ -267,13 +267,6 @@ def driven(obj: bpy.types.Object) -> bpy.types.Object:
     return obj
 
 
-def from_library() -> bpy.types.Object:
-    library = Path(bpy.app.tempdir) / "library.blend"
-    bpy.data.libraries.write(str(library), {obj := recorded()})
-    bpy.data.objects.remove(obj)
-    return linked(library, "Tool")
-
-
 def held() -> bpy.types.Object:
     handled(prop := new_prop("free"), *new_hands(), throw=0)
     return prop
@@ -307,7 +300,7 @@ GOES_ON = "Tool continues beyond its keys.*constant extrapolation"
         (lambda: key(new_object(), [1.0, 5.0, 9.0]), "Tool needs its 3 keys to stay within the tolerance", {}),
         (lambda: key(new_object(), np.arange(1.0, 30.0), scale="uneven"), "its scale is not uniform", {}),
         (with_(cycle_a_part), GOES_ON, {"tolerance": TOLERANCE, "radius": RADIUS}),
-        (from_library, "Tool is linked from another file: make it local first", {}),
+        (lambda: put_into_library(recorded()), "Tool is linked from another file: make it local first", {}),
         (held, r"Tool is held, so each hold is reduced separately.*by a tolerance", {"count": 12}),
         (recorded, "the tolerance must be a number above zero", {"tolerance": 0.0}),
         (recorded, "the tolerance must be a number above zero", {"tolerance": float("nan")}),

@@ -184,36 +184,35 @@ def test_the_turning_is_evened_where_asked_for(live_file):
     assert np.ptp(turned[whole]) < 0.01 * turned.mean()
 
 
-@pytest.mark.parametrize(
-    ("edit", "said"),
-    [
-        (
-            lambda obj: curves_of(obj)["location", 0].keyframe_points.remove(
-                curves_of(obj)["location", 0].keyframe_points[2]
-            ),
-            "frame 24",
-        ),
-        (lambda obj: [fcurve.keyframe_points.clear() for fcurve in curves_of(obj).values()], "key"),
-    ],
-)
-def test_what_cannot_be_is_refused_and_stays(live_file, edit, said):
+def without_a_key() -> bpy.types.Object:
     obj = key(new_object(), FEW_FRAMES)
-    edit(obj)
-    before = snapshot(obj)
-    with pytest.raises(Refused, match=said):
-        equalise_speed(obj)
-    assert snapshot(obj) == before
+    points = curves_of(obj)["location", 0].keyframe_points
+    points.remove(points[2])
+    return obj
 
 
-def test_a_body_that_stands_no_chosen_keys_and_an_unknown_easing_are_refused(live_file):
+def standing() -> bpy.types.Object:
     obj = new_object()
     write(obj, "location", np.array((1.0, 9.0)), np.array(((1.0, 0, 0), (1.0, 0, 0))))
-    with pytest.raises(Refused, match="key"):
-        equalise_speed(obj)
-    with pytest.raises(Refused, match="FAST is not an easing"):
-        equalise_speed(tool("dq_sclerp"), "FAST")
-    with pytest.raises(Refused, match="no two keys"):
-        equalise_speed(tool("dq_sclerp"), frames=())
+    return obj
+
+
+@pytest.mark.parametrize(
+    ("make", "wishes", "said"),
+    [
+        (without_a_key, {}, "frame 24"),
+        (new_object, {}, "key"),
+        (standing, {}, "key"),
+        (lambda: tool("dq_sclerp"), {"ease": "FAST"}, "FAST is not an easing"),
+        (lambda: tool("dq_sclerp"), {"frames": ()}, "no two keys"),
+    ],
+)
+def test_what_cannot_be_evened_is_refused_and_stays(live_file, make, wishes, said):
+    obj = make()
+    before = snapshot(obj)
+    with pytest.raises(Refused, match=said):
+        equalise_speed(obj, **wishes)
+    assert snapshot(obj) == before
 
 
 @pytest.mark.parametrize(
