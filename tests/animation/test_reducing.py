@@ -17,6 +17,7 @@ from rigid_motion.animation import (
     Refused,
     bake,
     bake_poses,
+    clean_motion,
     discard_dense_keys,
     hold_facts,
     is_baked,
@@ -53,9 +54,9 @@ def motion(name: str = "reach") -> tuple[np.ndarray, Poses]:
     return 1.0 + frames, interpolate(times - times[0], poses, frames / RATE, "lerp_slerp")
 
 
-def recorded(name: str = "reach", obj: bpy.types.Object | None = None) -> bpy.types.Object:
+def recorded(name: str = "reach") -> bpy.types.Object:
     """Return an object that moves as recorded."""
-    obj = obj or new_object()
+    obj = new_object()
     bake_poses(obj, *motion(name))
     return obj
 
@@ -65,15 +66,10 @@ def off(obj: bpy.types.Object, frames: np.ndarray, truth: Poses) -> float:
     return float(shell_error(read_poses(obj, frames), truth, RADIUS).max())
 
 
-def eighths(frames: np.ndarray) -> np.ndarray:
-    """Return all eighths of frames from the first to the last."""
-    return np.arange(8.0 * frames[0], 8.0 * frames[-1] + 1.0) / 8.0
-
-
 @pytest.mark.parametrize("count", [2, 5, 12])
 def test_an_object_gets_as_many_keys_as_were_asked_for_and_their_error_is_said(live_file, count):
     obj = recorded("throw")
-    moments = eighths(key_frames(obj))
+    moments = np.arange(8.0 * key_frames(obj)[0], 8.0 * key_frames(obj)[-1] + 1.0) / 8.0
     shown = read_poses(obj, moments)
     reduction = reduce_keys_of(obj, "motor_spline", radius=RADIUS, count=count)
     assert len(key_frames(obj)) == reduction.after == count
@@ -159,6 +155,8 @@ def test_what_was_done_last_is_taken_back_first_and_the_file_keeps_dense_keys_un
     write_channel(obj, '["weight"]', np.arange(1.0, 60.0), np.arange(59.0), interpolation="BOUNCE")
     curves_of(obj)['["weight"]', 0].mute = True
     before = [state()]
+    clean_motion(obj, radius=RADIUS)
+    before.append(state())
     first = reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
     before.append(state())
     bake(obj)
@@ -176,14 +174,18 @@ def test_what_was_done_last_is_taken_back_first_and_the_file_keeps_dense_keys_un
     obj = bpy.data.objects["Tool"]
     if let_go:
         unbake(obj)
-        assert (state(), reduction_of(obj)) == ((before[1][0], False, False), first)
+        assert (state(), reduction_of(obj)) == ((before[2][0], False, False), first)
+        restore_keys(obj)
+        assert state() == before[0], "those from before cleaning were not let go"
         with pytest.raises(Refused, match="Tool is neither reduced nor cleaned, or now has another Action"):
             restore_keys(obj)
     else:
-        for back, reduction in ((restore_keys, None), (unbake, first), (restore_keys, None)):
+        for back in (restore_keys, unbake, restore_keys, restore_keys):
             back(obj)
             assert state() == before.pop()
-            assert reduction in (None, reduction_of(obj))
+            assert back != unbake or reduction_of(obj) == first
+        with pytest.raises(Refused, match="Tool is not baked"):
+            unbake(obj)
     assert [action.name for action in bpy.data.actions] == ["ToolAction"]
 
 
