@@ -6,11 +6,11 @@ It uses `FCurve.evaluate` for keys and timing, and `interpolate` for the motion 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 import numpy as np
-from mathutils import Quaternion
+from mathutils import Euler, Quaternion
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import multiply
@@ -35,13 +35,24 @@ DEPENDS_ON_KEYS = {"pga_lerp", "cga_lerp", "motor_spline"}
 """In these modes a further key on the path would change the path."""
 
 
-@dataclass(frozen=True)
-class Own:
-    """Delta transforms of the object's own."""
+class Own(NamedTuple):
+    """Delta transforms of an object."""
 
-    location: tuple[float, ...] = (0.0, 0.0, 0.0)
-    quaternion: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
-    scale: tuple[float, ...] = (1.0, 1.0, 1.0)
+    location: tuple[float, ...]
+    quaternion: tuple[float, ...]
+    scale: tuple[float, ...]
+
+
+def own_deltas(obj: Carrier) -> Own:
+    """Return the delta transforms of an object; bones have none."""
+    if not isinstance(obj, bpy.types.Object):
+        return Own((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    turned = Quaternion()
+    if obj.rotation_mode == "QUATERNION":
+        turned = obj.delta_rotation_quaternion.normalized()
+    elif obj.rotation_mode != "AXIS_ANGLE":
+        turned = Euler(obj.delta_rotation_euler, obj.rotation_mode).to_quaternion()
+    return Own(tuple(obj.delta_location), tuple(turned), tuple(obj.delta_scale))
 
 
 class Body:
@@ -50,8 +61,8 @@ class Body:
     `keys` replaces the frames of the channels' own keys: cycles have more.
     """
 
-    def __init__(self, obj: Carrier, own: Own, keys: np.ndarray | None = None) -> None:
-        self.obj, self.own, self.scaled = obj, own, _scales_evenly(obj)
+    def __init__(self, obj: Carrier, keys: np.ndarray | None = None) -> None:
+        self.obj, self.own, self.scaled = obj, own_deltas(obj), _scales_evenly(obj)
         self.muted = [muted_in(obj, path) for path in transform_paths(obj)]
         curves = {path: moving_in(obj, path) for path in transform_paths(obj)}
         changing = [path for path, of_path in curves.items() if any(map(_changes, of_path.values()))]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import rule
 
 from rigid_motion import animation
-from tests.animation.body_oracle import DEPENDS_ON_KEYS, Body, Own
+from tests.animation.body_oracle import DEPENDS_ON_KEYS, Body
 from tests.animation.bones import rigs
 from tests.animation.keyed import (
     KEY_FIELDS,
@@ -29,7 +29,7 @@ from tests.animation.keyed import (
 )
 from tests.animation.machine import LAST, Machine, Name, frames_in, seeds, shares, while_on
 from tests.animation.modified import copy_modifier, is_term
-from tests.animation.oracle import expected_bases
+from tests.animation.oracle import assert_near, expected_bases
 from tests.animation.scenes import random_values
 
 ORDERS = (*rigs.ORDERS, "AXIS_ANGLE")
@@ -100,7 +100,7 @@ class Editing(Machine):
 
     def _expected(self, name: Name, frames: Sequence[float]) -> np.ndarray:
         """Return the matrices that its channels must produce on frames, (m, 4, 4)."""
-        return expected_bases(self._found(name), frames, self.owns.get(name))
+        return expected_bases(self._found(name), frames)
 
     def _curve(self, obj: Carrier, share: float) -> bpy.types.FCurve | None:
         curves = [curve for (path, _), curve in curves_of(obj).items() if path in WIDTHS and curve.keyframe_points]
@@ -205,23 +205,18 @@ class Editing(Machine):
         if not posed and not self._is_posed(obj):
             bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
             self._assert_in_place(seen)
-        if len(before):
-            error = np.abs(self._expected(name, goes_by) - before).max(axis=(1, 2))
-            worst = goes_by[error.argmax()]
-            assert error.max() < 1e-3 * max(1.0, np.abs(before).max()), f"{name} moves by {error.max()} on {worst}"
+        assert_near(self._expected(name, goes_by), before, name, 1e-3)
 
     def _assert_in_place(self, seen: dict) -> None:
         """Check that carriers are still displayed in the same place."""
         bpy.context.view_layer.update()
         for name, then in seen.items():
-            now = self._basis(self._found(name))
-            error = np.abs(now - then).max()
-            assert error < 1e-5 * max(1.0, np.abs(then).max()), f"{name} jumped from\n{then}\nto\n{now}"
+            assert_near(self._basis(self._found(name)), then, name)
 
     def _frames_kept_by_a_key(self, name) -> np.ndarray:
         """Return the frames on which the motion must stay if all keyed channels get a key now."""
         obj, frame = self._found(name), bpy.context.scene.frame_current_final
-        keys, mode, body = key_frames(obj), mode_at(obj, frame), Body(obj, self.owns.get(name, Own()))
+        keys, mode, body = key_frames(obj), mode_at(obj, frame), Body(obj)
         is_between = len(keys) > 1 and keys[0] < frame < keys[-1] and np.abs(keys - frame).min() >= 0.01
         if not is_between or not is_timed_together(obj, frame) or (mode in DEPENDS_ON_KEYS and body.may_spin()):
             return np.empty(0)

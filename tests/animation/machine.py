@@ -21,7 +21,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from rigid_motion import animation
 from tests.animation.keyed import Carrier, curves_of, key_frames, mode_at, moving_curves, snapshot
 from tests.animation.modified import is_term
-from tests.animation.oracle import Own
+from tests.animation.oracle import assert_near
 from tests.blank import blank
 from tests.thoroughness import THOROUGH
 
@@ -131,11 +131,6 @@ class Machine(RuleBasedStateMachine):
     def _sharing(self, name: Name) -> set[Name]:
         """Return the names of the carriers that share its channels, including itself."""
         raise NotImplementedError
-
-    @property
-    def owns(self) -> dict[Name, Own]:
-        """Return the objects' own delta transforms, by name."""
-        return {}
 
     def _is_held(self, name: Name) -> bool:
         """Whether its keys say that it is held."""
@@ -269,7 +264,7 @@ class Machine(RuleBasedStateMachine):
             # Without the extension everything plays as before.
             played = self._play()
             for name, then in self.playing.items():
-                assert np.abs(played[name] - then).max() < 1e-6 * max(1.0, np.abs(then).max())
+                assert_near(played[name], then, name, 1e-6)
         keyed = self._keyed()
         animation.register()
         bpy.context.view_layer.update()

@@ -1,8 +1,7 @@
 """Oracle for objects: where they must be, computed without `rigid_motion.animation`, and where Blender shows them.
 
 `expected_bases` uses Blender's own `FCurve.evaluate` for keys and timing, and `interpolate` for the motion of each
-segment. Nothing here reads delta transforms from the file: callers pass an object's own deltas.
-Matrices are (m, 4, 4), frames are the scene's.
+segment. Matrices are (m, 4, 4), frames are the scene's.
 """
 
 from __future__ import annotations
@@ -11,30 +10,25 @@ from collections.abc import Iterable, Sequence
 
 import bpy
 import numpy as np
-from mathutils import Euler, Quaternion
 
 from rigid_motion.animation.actions.modifiers import on_top
 from rigid_motion.motion import quaternions
-from tests.animation.body_oracle import Body, Own, channels, native
+from tests.animation.body_oracle import Body, channels, native
 from tests.animation.keyed import WIDTHS, Carrier, curve_of, curves_of, key_frames, rotation_path
 from tests.animation.modified import held_frames, modified, without_modifiers
 
-__all__ = ["Own"]
 
-
-def expected_bases(
-    obj: Carrier, frames: Sequence[float], own: Own | None = None, keys: np.ndarray | None = None
-) -> np.ndarray:
+def expected_bases(obj: Carrier, frames: Sequence[float], keys: np.ndarray | None = None) -> np.ndarray:
     """Return the object's matrices in its parent's space, by `FCurve.evaluate` on each frame, extrapolation included.
 
     Segments run between `keys`, by default the object's own; cycles have more. Stepped modifiers hold the poses. Other
     modifiers of the animator act on location and scale; those of rotations are ignored.
     """
-    own, fcurves = own or Own(), [fcurve for (path, _), fcurve in curves_of(obj).items() if path in WIDTHS]
-    held = held_frames(fcurves, frames)
+    fcurves = [fcurve for (path, _), fcurve in curves_of(obj).items() if path in WIDTHS]
+    held, body = held_frames(fcurves, frames), Body(obj, keys)
     with without_modifiers(fcurves):
-        location, quaternion, scale = Body(obj, own, keys).components(np.asarray(held, dtype=np.float64))
-    for path, values, delta in (("location", location, own.location), ("scale", scale, own.scale)):
+        location, quaternion, scale = body.components(np.asarray(held, dtype=np.float64))
+    for path, values, delta in (("location", location, body.own.location), ("scale", scale, body.own.scale)):
         for index in range(3):
             fcurve = curve_of(obj, path, index)
             if fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute and list(on_top(fcurve)):
@@ -44,13 +38,12 @@ def expected_bases(
     return matrices(location, quaternion, scale)
 
 
-def expected_worlds(obj: bpy.types.Object, frames: Sequence[float], owns: dict[str, Own] | None = None) -> np.ndarray:
-    """Return the object's world matrices, with moving parents. `owns` has deltas by object name."""
-    owns = owns or {}
-    bases = expected_bases(obj, frames, owns.get(obj.name))
+def expected_worlds(obj: bpy.types.Object, frames: Sequence[float]) -> np.ndarray:
+    """Return the object's world matrices, with moving parents."""
+    bases = expected_bases(obj, frames)
     if obj.parent is None:
         return bases
-    return expected_worlds(obj.parent, frames, owns) @ np.array(obj.matrix_parent_inverse) @ bases
+    return expected_worlds(obj.parent, frames) @ np.array(obj.matrix_parent_inverse) @ bases
 
 
 def matrices(location: np.ndarray, quaternion: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -101,9 +94,13 @@ def world_now(name: str = "Tool") -> np.ndarray:
     return world_of(bpy.data.objects[name])
 
 
-def assert_shown(
-    objects: Iterable[bpy.types.Object], frames: Sequence[float], owns: dict[str, Own] | None = None
-) -> None:
+def assert_near(now: np.ndarray, then: np.ndarray, what: str = "it", tolerance: float = 1e-5) -> None:
+    """Check that arrays are equal, to this fraction of the largest value, or of 1."""
+    error = np.abs(now - then).max(initial=0.0) / max(1.0, np.abs(then).max(initial=0.0))
+    assert error < tolerance, f"{what} is off by {error:.3g} of its size"
+
+
+def assert_shown(objects: Iterable[bpy.types.Object], frames: Sequence[float]) -> None:
     """Check that the scene shows these objects where they must be, to 1e-5 of their size.
 
     Where Blender's own quaternion passes near zero, single precision leaves less of its direction, and no delta
@@ -111,7 +108,7 @@ def assert_shown(
     """
     objects = list(objects)
     for obj, shown in zip(objects, shown_worlds(objects, frames), strict=True):
-        assert_there(obj, frames, shown, expected_worlds(obj, frames, owns), _native_size(obj, frames))
+        assert_there(obj, frames, shown, expected_worlds(obj, frames), _native_size(obj, frames))
 
 
 def assert_there(
@@ -139,12 +136,3 @@ def shortest_quaternion(obj: Carrier, frames: Sequence[float]) -> np.ndarray:
     values = channels(obj, rotation_path(obj), np.asarray(frames))
     own = np.minimum(np.linalg.norm(values, axis=1), 1.0) if obj.rotation_mode == "QUATERNION" else 1.0
     return own if obj.parent is None else own * shortest_quaternion(obj.parent, frames)
-
-
-def as_quaternion(angles: Sequence[float], order: str) -> tuple[float, ...]:
-    """Return an object's own Euler delta as a quaternion."""
-    return tuple(Euler(angles, order).to_quaternion())
-
-
-def unit(values: Sequence[float]) -> tuple[float, ...]:
-    return tuple(Quaternion(values).normalized())

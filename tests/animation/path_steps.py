@@ -19,7 +19,7 @@ from rigid_motion.motion.affine import AffineMaps
 from tests.animation.body_oracle import DEPENDS_ON_KEYS, location_axes
 from tests.animation.keyed import WIDTHS, curve_of, key_frames, mode_at, moving_curves, transform_paths
 from tests.animation.machine import TURNS, Name, seeds, shares, while_on
-from tests.animation.oracle import shown_worlds
+from tests.animation.oracle import assert_near, shown_worlds
 from tests.animation.tool_steps import WithTools
 
 VALUE_AND_SETTINGS = 1, *range(6, 14)
@@ -110,12 +110,9 @@ class WithPaths(WithTools):
             # In a space of uneven scale, a key cannot be turned exactly in the world. It comes as near as it can.
             scales = np.swapaxes(spaces.maps.axes, 1, 2) @ spaces.maps.axes
             is_even = np.allclose(scales, scales[:, :1, :1] * np.eye(3), atol=1e-5 * np.abs(scales).max())
-            error = np.abs(now - there)[:, :3, 0 if is_even or how == "move" else 3 :].max()
-            assert error < 1e-5 * max(1.0, np.abs(there).max()), f"{name} is off by {error}:\n{now}\nis not\n{there}"
-        error = np.abs(self._expected(name, stay) - poses).max(initial=0.0)
-        assert error < (1e-3 if how == "insert" else 1e-5) * max(1.0, np.abs(poses).max(initial=0.0)), (
-            f"{name} moves by {error} where it was to stay"
-        )
+            columns = slice(0 if is_even or how == "move" else 3, 4)
+            assert_near(now[:, :3, columns], there[:, :3, columns], name)
+        assert_near(self._expected(name, stay), poses, name, 1e-3 if how == "insert" else 1e-5)
 
     @while_on(
         who=shares,
@@ -148,8 +145,7 @@ class WithPaths(WithTools):
             assert after == before
             return
         assert_keys_at(before, after, lambda x: x, (1, 7, 8, 9, 12, 13))
-        error = np.abs(self._expected(name, stay) - poses).max(initial=0.0)
-        assert error < 1e-5 * max(1.0, np.abs(poses).max(initial=0.0)), f"{name} moves by {error} where it was to stay"
+        assert_near(self._expected(name, stay), poses, name)
 
     def _free_handles(self, name: Name) -> None:
         for fcurve in moving_curves(self._found(name)):

@@ -9,11 +9,11 @@ from pathlib import Path
 import addon_utils
 import bpy
 import numpy as np
+from mathutils import Quaternion
 
 from rigid_motion.animation import key_frames, set_mode, write_channel
 from rigid_motion.animation.actions.channels import replace_keys
 from tests.animation.keyed import WIDTHS, Carrier, curves_of, rotation_path
-from tests.animation.oracle import Own, as_quaternion, unit
 
 FRAMES = (1.0, 11.0, 24.0, 40.0)
 
@@ -42,14 +42,13 @@ def key(
     frames: Sequence[float] = FRAMES,
     *,
     seed: int = 0,
-    location: bool = True,
     scale: str | None = None,
     interpolation: str = "BEZIER",
 ) -> Carrier:
     """Key location, rotation and (with scale "even" or "uneven") scale at random on these frames."""
     # Each bone of a rig moves differently.
     seed += 0 if isinstance(carrier, bpy.types.Object) else sum(map(ord, carrier.name))
-    for path in (*(["location"] if location else []), rotation_path(carrier), *(["scale"] if scale else [])):
+    for path in ("location", rotation_path(carrier), *(["scale"] if scale else [])):
         values = random_values(carrier, path, len(frames), seed, scale == "even")
         write(carrier, path, np.array(frames), values, interpolation)
     return carrier
@@ -59,25 +58,6 @@ def write(carrier: Carrier, path: str, frames: np.ndarray, values: np.ndarray, i
     """Replace a property's channels. Those of a bone get its group in the Dope Sheet, as with keys set by hand."""
     group = "" if isinstance(carrier, bpy.types.Object) else carrier.name
     write_channel(carrier.id_data, carrier.path_from_id(path), frames, values, interpolation=interpolation, group=group)
-
-
-def turning(
-    name: str, degrees: Sequence[float], frames: Sequence[float], rotation_mode: str = "QUATERNION", sign: float = 1.0
-) -> bpy.types.Object:
-    """Return an object that turns about z to these angles and moves 2 along x per key. Every second key has `sign`."""
-    obj, angles, count = new_object(name, rotation_mode), np.radians(degrees), np.arange(len(frames))
-    write_channel(obj, "location", np.array(frames), np.outer(count, (2.0, 0.0, 0.0)))
-    if rotation_mode == "QUATERNION":
-        columns = np.cos(angles / 2.0), 0.0 * angles, 0.0 * angles, np.sin(angles / 2.0)
-        write_channel(
-            obj,
-            "rotation_quaternion",
-            np.array(frames),
-            np.transpose(columns) * np.where(count % 2, sign, 1.0)[:, None],
-        )
-    elif rotation_mode != "AXIS_ANGLE":
-        write_channel(obj, "rotation_euler", np.array(frames), np.outer(angles, (0.0, 0.0, 1.0)))
-    return obj
 
 
 def key_densely(obj: Carrier) -> None:
@@ -92,25 +72,13 @@ def key_densely(obj: Carrier) -> None:
         assert not fcurve.modifiers
 
 
-def give_own_deltas(obj: bpy.types.Object, seed: int = 0) -> Own:
-    """Give the object random delta transforms of its own, and return them."""
+def give_own_deltas(obj: bpy.types.Object, seed: int = 0) -> None:
+    """Give the object random delta transforms of its own."""
     random = np.random.default_rng(seed)
     obj.delta_location = random.normal(size=3)
     obj.delta_scale = np.full(3, np.exp(0.3 * random.normal()))
-    obj.delta_rotation_quaternion = unit(random.normal(size=4))
+    obj.delta_rotation_quaternion = Quaternion(random.normal(size=4)).normalized()
     obj.delta_rotation_euler = random.normal(size=3)
-    return own_deltas(obj)
-
-
-def own_deltas(obj: bpy.types.Object) -> Own:
-    """Return the delta transforms of an object without in-betweens."""
-    if obj.rotation_mode == "QUATERNION":
-        turned = unit(obj.delta_rotation_quaternion)
-    elif obj.rotation_mode == "AXIS_ANGLE":
-        turned = (1.0, 0.0, 0.0, 0.0)
-    else:
-        turned = as_quaternion(obj.delta_rotation_euler, obj.rotation_mode)
-    return Own(tuple(obj.delta_location), turned, tuple(obj.delta_scale))
 
 
 def push_down(obj: bpy.types.Object, start: int = 1, **settings: float) -> bpy.types.NlaStrip:

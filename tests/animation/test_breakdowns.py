@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import bpy
 import numpy as np
 import pytest
@@ -13,21 +11,20 @@ from rigid_motion.animation import Breakdowns, Refused, breakdown, set_mode, set
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curves_of, key_frames, snapshot
-from tests.animation.oracle import Own, expected_bases, matrices, shown_worlds, world_now
+from tests.animation.oracle import expected_bases, matrices, shown_worlds, world_now
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, random_values
 
 FACTORS = (-0.3, 0.0, 0.35, 1.0, 1.25)
 BEFORE, NOW, AFTER = 11.0, 17.0, 24.0
-NO_DELTAS = Own()
 
 
-def key_poses(obj: bpy.types.Object, own: Own = NO_DELTAS) -> Poses:
-    """Return the poses that `key` set on an object, with its own delta transforms except their scale."""
-    return Poses.from_matrices(expected_bases(obj, FRAMES, replace(own, scale=NO_DELTAS.scale)))
+def key_poses(obj: bpy.types.Object) -> Poses:
+    """Return the poses that `key` set on an object, with its delta transforms."""
+    return Poses.from_matrices(expected_bases(obj, FRAMES))
 
 
-def as_matrices(poses: Poses, own: Own = NO_DELTAS) -> np.ndarray:
-    scales = own.scale[0] * (np.ones(len(poses)) if poses.scales is None else poses.scales)
+def as_matrices(poses: Poses) -> np.ndarray:
+    scales = np.ones(len(poses)) if poses.scales is None else poses.scales
     return matrices(poses.positions, poses.quaternions, np.repeat(scales[:, None], 3, axis=1))
 
 
@@ -44,18 +41,20 @@ def on_path(keys: Poses, mode: str, factor: float, times=FRAMES) -> Poses:
 def test_a_breakdown_is_on_the_path_of_the_mode(live_file, mode, what):
     order, scale = what
     obj = new_object(rotation_mode=order)
-    own = give_own_deltas(obj, 3)
+    give_own_deltas(obj, 3)
+    obj.delta_scale = (1.0, 1.0, 1.0)
     # In a smooth mode, handles would change the path.
     key(obj, seed=5, scale=scale, interpolation="LINEAR" if KEYFRAME_MODES[mode].is_smooth else "BEZIER")
     set_mode(obj, mode)
     bpy.context.scene.frame_set(int(NOW))
-    keys = key_poses(obj, own)
+    keys = key_poses(obj)
+    obj.delta_scale = (0.8, 0.8, 0.8)
     tries = Breakdowns(obj)
     for factor in FACTORS:
         if KEYFRAME_MODES[mode].is_smooth and not 0.0 <= factor <= 1.0:
             continue
         tries.apply(factor)
-        expected = as_matrices(on_path(keys, mode, factor), own)[0]
+        expected = as_matrices(on_path(keys, mode, factor))[0] @ np.diag((0.8, 0.8, 0.8, 1.0))
         np.testing.assert_allclose(world_now(), expected, atol=2e-5 * np.abs(expected).max())
         assert key_frames(obj).tolist() == [FRAMES[0], BEFORE, NOW, AFTER, FRAMES[3]]
         # It is a key like any other: it stays when the frame changes.
@@ -79,19 +78,19 @@ def test_where_a_segment_is_blenders_a_breakdown_is_blenders_own(live_file):
 @pytest.mark.parametrize("kind", ["PUSH", "RELAX"])
 def test_push_and_relax_go_from_the_pose_that_is_seen_along_the_mode(live_file, kind, mode):
     obj = new_object()
-    own = give_own_deltas(obj, 8)
+    give_own_deltas(obj, 8)
     key(obj, seed=9, interpolation="LINEAR")
     set_mode(obj, mode)
     bpy.context.scene.frame_set(int(NOW))
-    keys = key_poses(obj, own)
+    keys = key_poses(obj)
     share = (NOW - BEFORE) / (AFTER - BEFORE)
     between = on_path(keys, mode, share)
-    np.testing.assert_allclose(world_now(), as_matrices(between, own)[0], atol=2e-5)
+    np.testing.assert_allclose(world_now(), as_matrices(between)[0], atol=2e-5)
     obj.location = np.add(obj.location, (0.4, -0.3, 0.2))
     bpy.context.view_layer.update()
     seen = world_now()
     breakdown(obj, 0.3, kind)
-    ends = Poses.from_matrices(np.concatenate((seen[None], as_matrices(between, own))))
+    ends = Poses.from_matrices(np.concatenate((seen[None], as_matrices(between))))
     factor = -0.3 if kind == "PUSH" else 0.3
     expected = interpolate((0.0, 1.0), ends, np.array([factor]), mode, extrapolate=True)
     np.testing.assert_allclose(world_now(), as_matrices(expected)[0], atol=3e-5 * max(1.0, np.abs(seen).max()))

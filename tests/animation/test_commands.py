@@ -29,6 +29,7 @@ from tests.animation.bones.rigs import (
     select_only,
 )
 from tests.animation.keyed import Carrier, curves_of, rotation_path, transform_paths
+from tests.animation.oracle import assert_near
 from tests.animation.scenes import editor, give_own_deltas, key, key_densely, new_object, push_down
 from tests.blank import blank
 
@@ -233,8 +234,7 @@ def test_a_command_does_what_it_does_on_a_key(live_file, tmp_path, case, way):
     with own_clipboard(tmp_path):
         shown, expected = (left_by(command, kind, order, auto, of_twins=of_twins) for of_twins in (False, True))
     for when, (one, other) in enumerate(zip(shown, expected, strict=True)):
-        off = np.abs(one - other).max()
-        assert off < 1e-5 * max(1.0, np.abs(other).max()), f"off by {off} at {when}"
+        assert_near(one, other, f"{command} at {when}")
 
 
 def test_what_is_made_deltas_stays_where_it_is_seen(live_file):

@@ -17,7 +17,7 @@ from rigid_motion.animation.fcurves.keys import Cycles
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curves_of, key_frames, rotation_path, snapshot
-from tests.animation.oracle import expected_bases, matrices, shown_worlds
+from tests.animation.oracle import assert_near, expected_bases, matrices, shown_worlds
 from tests.animation.scenes import key, new_object, random_values
 
 CYCLES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")
@@ -82,9 +82,7 @@ def unrolled(
 
 
 def assert_unrolled(obj: bpy.types.Object, *cycles: object) -> None:
-    shown, expected = shown_worlds([obj], AROUND)[0], unrolled(obj, *cycles)
-    error = np.abs(shown - expected).max(axis=(1, 2)) / np.abs(expected).max()
-    assert error.max() < 1e-5, f"off by {error.max():.3g} on frame {AROUND[error.argmax()]}"
+    assert_near(shown_worlds([obj], AROUND)[0], unrolled(obj, *cycles))
 
 
 CASES = [

@@ -24,9 +24,9 @@ BETWEEN, ON_FRAMES = 1e-4, 1e-5
 POINTS = np.concatenate((np.zeros((1, 3)), np.eye(3)))
 
 
-def errors(obj: bpy.types.Object, frames: np.ndarray, owns: dict) -> np.ndarray:
+def errors(obj: bpy.types.Object, frames: np.ndarray) -> np.ndarray:
     """Return the largest error on each frame of the origin of an object and of points along its axes."""
-    pairs = shown_worlds([obj], frames)[0], expected_worlds(obj, frames, owns)
+    pairs = shown_worlds([obj], frames)[0], expected_worlds(obj, frames)
     shown, expected = (m[:, None, :3, :3] @ POINTS[:, :, None] + m[:, None, :3, 3:] for m in pairs)
     return np.linalg.norm(shown - expected, axis=2).max(axis=(1, 2))
 
@@ -37,19 +37,19 @@ def errors(obj: bpy.types.Object, frames: np.ndarray, owns: dict) -> np.ndarray:
 )
 def test_every_mode_is_exact_at_any_time_with_any_timing(live_file, how, where):
     """Also with a parent and delta transforms."""
-    (order, timing), (mode, shift, placed), owns = how, where, {}
+    (order, timing), (mode, shift, placed) = how, where
     obj = new_object("Tool", order)
     if placed and order != "AXIS_ANGLE":
-        owns["Tool"] = give_own_deltas(obj)
+        give_own_deltas(obj)
         obj.parent = new_object("Parent", "XYZ")
         obj.parent.location, obj.parent.rotation_euler = (1.0, 2.0, -0.5), (0.3, -0.4, 1.0)
     key(obj, np.array(FRAMES) + shift, interpolation=timing)
     set_mode(obj, mode)
     bpy.context.view_layer.update()
-    off = errors(obj, EIGHTHS + shift, owns)
+    off = errors(obj, EIGHTHS + shift)
     assert off.max() < BETWEEN
     assert off[::8].max() < ON_FRAMES
     assert refresh() == 0
     frame = 7.375 + shift
     live_file.scene.frame_set(int(np.floor(frame)), subframe=frame % 1.0)
-    np.testing.assert_allclose(obj.matrix_world, expected_worlds(obj, [frame], owns)[0], rtol=0.0, atol=ON_FRAMES)
+    np.testing.assert_allclose(obj.matrix_world, expected_worlds(obj, [frame])[0], rtol=0.0, atol=ON_FRAMES)

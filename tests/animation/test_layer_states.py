@@ -15,6 +15,7 @@ from tests.animation.held import in_holder, worlds
 from tests.animation.keyed import MODE_IDS, Carrier, curves_of, rotation_path
 from tests.animation.layered import key_base, new, offsets, seen
 from tests.animation.machine import SETTINGS, Machine, Name, seeds, shares, while_on
+from tests.animation.oracle import assert_near
 from tests.balls import displaced
 from tests.thoroughness import THOROUGH
 
@@ -62,8 +63,7 @@ class Layering(Machine):
         self._assert_seen_as(state[0]["Tool"])
 
     def _assert_seen_as(self, expected: np.ndarray) -> None:
-        error = np.abs(seen(self.tool, FRAMES) - expected).max()
-        assert error < PRECISION * max(1.0, np.abs(expected).max()), f"it is off by {error}"
+        assert_near(seen(self.tool, FRAMES), expected, tolerance=PRECISION)
 
     def _play(self) -> dict[Name, np.ndarray]:
         return {"Tool": seen(self.tool, FRAMES)}

@@ -15,7 +15,7 @@ from rigid_motion.animation import problem_of, refresh, repeat, set_mode
 from rigid_motion.animation.actions.modifiers import set_settings
 from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curves_of, rotation_path, snapshot
-from tests.animation.oracle import shown_worlds
+from tests.animation.oracle import assert_near, shown_worlds
 from tests.animation.scenes import give_own_deltas, key, key_densely, new_object
 
 PLAYED, IN_ROUNDS = np.arange(1.0, 40.0, 0.25), np.arange(-60.0, 120.0, 0.5)
@@ -82,7 +82,7 @@ def test_a_modifier_acts_on_what_is_seen(live_file, what, how):
     assert problem_of(obj) == ""
     assert refresh() == 0
     shown, expected = shown_worlds([obj, dense], IN_ROUNDS if in_rounds else PLAYED)
-    assert np.abs(shown - expected).max() < 2e-5 * max(1.0, np.abs(expected).max())
+    assert_near(shown, expected, what, 2e-5)
     set_mode(obj, "BLENDER")
     for fcurve in some_of(obj):
         for kept, (kind, settings) in zip(list(fcurve.modifiers)[in_rounds:], modifiers, strict=True):

@@ -24,7 +24,7 @@ from tests.animation.keyed import (
     transform_paths,
 )
 from tests.animation.machine import LAST, frames_in, goes_on, seeds, shares, while_on
-from tests.animation.oracle import world_of
+from tests.animation.oracle import assert_near, world_of
 from tests.animation.scenes import editor, random_values
 
 
@@ -69,7 +69,7 @@ class WithTools(Editing):
         is_whole = is_whole and all(of_one.issuperset(ends) for of_one in frames)
         if kind == "BREAKDOWN" and factor in (0.0, 1.0) and is_whole:
             now, then = self._expected(name, [frame, ends[int(factor)]])
-            assert np.abs(now - then).max() < 2e-5 * max(1.0, np.abs(then).max()), f"{name}: {now}\nis not\n{then}"
+            assert_near(now, then, name, 2e-5)
 
     @while_on(
         who=shares,
@@ -157,7 +157,7 @@ class WithTools(Editing):
                         fcurve.convert_to_keyframes(first, last)
 
         self._edit(change, lambda made, after: None)
-        assert np.abs(self._bases([name], frames)[name] - before).max() < 1e-5 * max(1.0, np.abs(before).max())
+        assert_near(self._bases([name], frames)[name], before, name)
         bpy.ops.ed.undo()
         self.place -= 1
         self._restore_remembered_names()
@@ -195,9 +195,7 @@ class WithTools(Editing):
             # Motion that extrapolates is baked over another range.
             kept = np.isin(every, keys[name]) | (is_step & (len(live) == 1 or not goes_on(self._found(name))))
             for (chosen, then), (_, now) in zip(before[name], self._baked(name, every), strict=True):
-                frames, then, now = every[kept & chosen], then[kept & chosen], now[kept & chosen]
-                error = np.abs(now - then).max(axis=(1, 2), initial=0.0) / max(1.0, np.abs(then).max(initial=0.0))
-                assert error.max(initial=0.0) < 2e-5, f"{name} is baked otherwise on {frames[error.argmax()]}"
+                assert_near(now[kept & chosen], then[kept & chosen], name, 2e-5)
         self.history[self.place] = self._current_state()
 
     def _is_live(self, name: Hashable) -> bool:
@@ -246,8 +244,7 @@ class WithTools(Editing):
             assert np.abs(seen[0][:3, 3] - there).max() < 1e-4 * max(1.0, np.abs(before).max(), np.abs(there).max())
         bpy.context.scene.frame_set(int(frame // 1) + 3)
         bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
-        error = np.abs(world_of(self._found(name)) - seen[0]).max()
-        assert error < 1e-5 * max(1.0, np.abs(seen[0]).max()), f"{name} went on by {error}"
+        assert_near(world_of(self._found(name)), seen[0], name)
 
     def _snaps_exactly(self, name: Hashable) -> bool:
         """Whether Blender's tools now move it exactly to the requested place."""

@@ -15,8 +15,8 @@ from tests.animation.editing import ORDERS
 from tests.animation.holds.hold_steps import WithHolds
 from tests.animation.keyed import MODE_IDS, WIDTHS, curves_of, key_frames, snapshot, transform_paths
 from tests.animation.machine import LAST, SETTINGS, goes_on, seeds, shares, while_on
-from tests.animation.oracle import Own, assert_shown, expected_bases
-from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, push_down, tweak
+from tests.animation.oracle import assert_shown, expected_bases
+from tests.animation.scenes import give_own_deltas, key, new_object, push_down, tweak
 
 
 class EditingObjects(WithHolds):
@@ -57,16 +57,12 @@ class EditingObjects(WithHolds):
     def _sharing(self, name: str) -> set[str]:
         return {obj.name for obj in self._users(self._found(name))}
 
-    @property
-    def owns(self) -> dict[str, Own]:
-        return {name: own_deltas(self._found(name)) for name in self.names}
-
     def _assert_shown(self, names: Sequence[str], frames: np.ndarray) -> None:
         for name in names:
             if any(map(self._is_held, self._carrying(name))):
                 self._assert_held(name, frames)
             else:
-                assert_shown([self._found(name)], frames, self.owns)
+                assert_shown([self._found(name)], frames)
 
     def _carrying(self, name: str) -> list[str]:
         parent = self._found(name).parent
@@ -119,7 +115,7 @@ class EditingObjects(WithHolds):
                 obj.keyframe_insert(path, frame=frame)
 
         self._edit(set_and_key, self._inserted_keys_check(frame))
-        now = expected_bases(bpy.data.objects[name], [frame], self.owns[name])[0]
+        now = expected_bases(bpy.data.objects[name], [frame])[0]
         size = max(1.0, np.abs(matrix).max())
         assert np.abs(now[:3, 3] - matrix.translation).max() < 2e-5 * size
         turned = Matrix(now.tolist()).to_quaternion().rotation_difference(matrix.to_quaternion())
@@ -177,7 +173,7 @@ class EditingObjects(WithHolds):
             self._set_a_value(fcurve, 0.0, seed)
             bpy.context.view_layer.update()
         own = np.round(8.0 * np.linspace(strip.action_frame_start, strip.action_frame_end, 9)[1:-1]) / 8.0
-        expected = expected_bases(obj, own, self.owns[name])
+        expected = expected_bases(obj, own)
         frames = strip.frame_start + scale * (own - strip.action_frame_start)
         obj.animation_data.use_tweak_mode = False
         bpy.context.view_layer.update()
