@@ -37,7 +37,7 @@ from tests.animation.held import KINDS, handled, new_hands, new_prop, worlds
 from tests.animation.keyed import Carrier, curves_of, rotation_path, snapshot
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, new_object, put_into_library
-from tests.balls import displaced, largest_displacements
+from tests.balls import largest_displacements
 from tests.world_poses import read_poses
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
@@ -219,6 +219,7 @@ def test_what_is_held_is_baked_and_reduced_in_its_holders_and_passes_as_before(l
     assert reduction.before == 80
     assert reduction.after == len(key_frames(prop)) < 40
     assert {20.0, 40.0, 60.0} <= set(key_frames(prop))
+    assert [frame for frame in key_frames(prop) if 40.0 < frame < 60.0] == [], "in this hand it rests"
     assert switches(prop) == before
     apart = worlds(prop, frames) - truth
     # In the last frame before a switch, only the whole frames count.
@@ -234,23 +235,6 @@ def test_what_is_held_is_baked_and_reduced_in_its_holders_and_passes_as_before(l
     assert switches(prop) == before
     unbake(prop)
     assert snapshot(prop) == by_hand
-
-
-def test_what_rests_in_a_hand_is_left_with_a_key_for_each_time(live_file):
-    prop, hands = new_prop("free"), new_hands()
-    handled(prop, *hands, throw=0)
-    for fcurve in curves_of(prop).values():
-        for point in fcurve.keyframe_points:
-            if point.co.x == 28.0:
-                fcurve.keyframe_points.remove(point)
-                break
-    bpy.context.view_layer.update()
-    bake(prop)
-    before = worlds(prop)
-    reduce_keys_of(prop, "motor_spline", TOLERANCE, RADIUS)
-    frames = key_frames(prop)
-    assert frames[(frames > 19.5) & (frames < 60.0)].tolist() == [20.0, 40.0]
-    assert displaced(worlds(prop), before, RADIUS).max() <= TOLERANCE * (1.0 + 1e-3)
 
 
 # Where keys cannot be reduced
