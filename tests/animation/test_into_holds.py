@@ -5,6 +5,8 @@ Displayed poses are compared point by point without using the program. Objects t
 
 from __future__ import annotations
 
+from functools import partial
+
 import bpy
 import numpy as np
 import pytest
@@ -12,16 +14,14 @@ from mathutils import Matrix, Quaternion
 
 from rigid_motion.animation import (
     Refused,
-    bake_to_world,
     held_segments,
-    hold_in,
     key_frames,
     reduce_into_holds,
     reduction_of,
     restore_keys,
     set_mode,
 )
-from tests.animation.held import KINDS, holders_on, new_prop, put, wander, worlds
+from tests.animation.held import KINDS, holders_on, new_prop, wander, worlds
 from tests.animation.keyed import Carrier, curves_of, rotation_path, snapshot
 from tests.animation.scenes import new_object, write
 from tests.balls import displaced
@@ -63,10 +63,16 @@ def moved(seed: int = 0, noise: float = NOISE, pick: int = 20, put_down: int = 6
     return places
 
 
+def in_hands(kind: str = "free", **how: int) -> Carrier:
+    """Return a prop that was recorded in the hands of a rig."""
+    prop, _ = new_prop(kind), recorded_rig()
+    record(prop, moved(**how))
+    return prop
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_hands_held_gets_a_key_for_each_time_and_is_shown_within_the_tolerance(live_file, kind):
-    prop, body = new_prop(kind), recorded_rig()
-    record(prop, moved())
+    prop, body = in_hands(kind), bpy.data.objects["Body"]
     before, keys = worlds(prop), snapshot(prop)
     bpy.context.scene.frame_set(33)
     found = held_segments(prop, [body], TOLERANCE, RADIUS)
@@ -110,9 +116,9 @@ def test_what_hands_held_gets_a_key_for_each_time_and_is_shown_within_the_tolera
 
 
 def test_all_rigs_are_looked_at_and_those_segments_that_are_wanted_are_done(live_file):
-    prop, _ = new_prop("free"), recorded_rig()
-    record(prop, moved())
+    prop = in_hands()
     left, right = held_segments(prop, tolerance=TOLERANCE, radius=RADIUS)
+    assert held_segments(prop, tolerance=TOLERANCE, radius=RADIUS, least=25) == []
     reduce_into_holds(prop, segments=[right])
     assert holders_on(prop, (30, 50)) == ["Hand.R", ""]
     # Existing holds stay.
@@ -122,26 +128,6 @@ def test_all_rigs_are_looked_at_and_those_segments_that_are_wanted_are_done(live
     assert displaced(worlds(prop), moved(), RADIUS).max() <= TOLERANCE
     restore_keys(prop)
     assert key_frames(prop).tolist() == FRAMES.tolist()
-
-
-def test_what_lies_about_is_not_held_by_what_rests_beside_it(live_file):
-    prop, body = new_prop("free"), recorded_rig(still=("Root", "Spine", "Head", "Arm.R", "Hand.R"))
-    resting = worlds(body.pose.bones["Hand.R"])
-    assert np.ptp(resting, axis=0).max() == 0.0
-    record(prop, resting @ GRIP)
-    assert held_segments(prop, [body], TOLERANCE, RADIUS) == []
-    with pytest.raises(Refused, match="Tool is at rest in none of 7 bones and objects for 5 frames"):
-        reduce_into_holds(prop, [body], TOLERANCE, RADIUS)
-
-
-def test_nor_is_what_moves_past_a_hand_or_for_a_moment_with_it(live_file):
-    prop, body = new_prop("free"), recorded_rig()
-    record(prop, moved(pick=40, put_down=45, over=1))
-    assert held_segments(prop, [body], TOLERANCE, RADIUS) == []
-    assert [one.name for one in held_segments(prop, [body], TOLERANCE, RADIUS, least=3)] == ["Hand.L"]
-    wander(prop, 5)
-    write(prop, "location", FRAMES, np.stack((np.sin(0.2 * FRAMES), 0.1 * FRAMES, 0.0 * FRAMES), axis=1))
-    assert held_segments(prop, [body], TOLERANCE, RADIUS) == []
 
 
 def test_of_bones_that_do_not_move_against_one_another_the_nearest_holds(live_file):
@@ -165,26 +151,22 @@ def test_objects_hold_too_but_not_those_that_follow_it(live_file):
         held_segments(prop, [child, prop], TOLERANCE, RADIUS)
 
 
-def test_what_was_held_and_baked_to_the_world_is_held_again(live_file):
-    prop, body = new_prop("free"), recorded_rig()
-    put(prop, 1.0, (0.3, 0.2, 0.1), Quaternion((0.9, 0.1, 0.2, 0.3)))
-    for frame, holder in ((20, body.pose.bones["Hand.R"]), (62, None)):
-        bpy.context.scene.frame_set(frame)
-        hold_in(prop, holder)
-    bpy.context.view_layer.update()
-    before = worlds(prop)
-    bake_to_world(prop)
-    (found,) = held_segments(prop, [body], 1e-4, RADIUS)
-    # After its last key the tool rests.
-    assert (found.name, found.first, found.last) == ("Hand.R", 21.0, 61.0)
-    reduce_into_holds(prop, [body], 1e-4, RADIUS)
-    assert displaced(worlds(prop), before, RADIUS).max() < 1e-5
+def lying() -> Carrier:
+    """Return a tool that lies beside a hand that rests."""
+    prop, body = new_prop("free"), recorded_rig(still=("Root", "Spine", "Head", "Arm.R", "Hand.R"))
+    record(prop, worlds(body.pose.bones["Hand.R"]) @ GRIP)
+    return prop
+
+
+def moving_past() -> Carrier:
+    prop, _ = new_prop("free"), recorded_rig()
+    wander(prop, 5)
+    write(prop, "location", FRAMES, np.stack((np.sin(0.2 * FRAMES), 0.1 * FRAMES, 0.0 * FRAMES), axis=1))
+    return prop
 
 
 def far_apart() -> Carrier:
-    prop = new_prop("free")
-    places = moved()
-    record(prop, places)
+    prop = in_hands()
     for fcurve in curves_of(prop).values():
         for _ in range(61, 70):
             fcurve.keyframe_points.remove(fcurve.keyframe_points[60])
@@ -193,31 +175,36 @@ def far_apart() -> Carrier:
 
 
 def growing() -> Carrier:
-    prop = new_prop("free")
-    record(prop, moved())
+    prop = in_hands()
     write(prop, "scale", FRAMES[[0, -1]], np.array(((1.0, 1.0, 1.0), (2.0, 2.0, 2.0))))
     return prop
 
 
 def unkeyed() -> Carrier:
+    recorded_rig()
     return new_prop("free")
+
+
+NOT_HELD = "Tool is at rest in none of 7 bones and objects for 5 frames"
 
 
 @pytest.mark.parametrize(
     ("make", "message", "wishes"),
     [
+        (lying, NOT_HELD, {}),
+        (moving_past, NOT_HELD, {}),
+        (partial(in_hands, pick=40, put_down=45, over=1), NOT_HELD, {}),
         (far_apart, "Tool has distant keys around frame 60.*bake them first", {}),
         (growing, "Tool grows or shrinks, but held things have a constant size", {}),
         (unkeyed, "Tool has no keys of location or rotation to reduce", {}),
-        (growing, "the tolerance must be a number above zero", {"tolerance": float("nan")}),
+        (in_hands, "the tolerance must be a number above zero", {"tolerance": float("nan")}),
     ],
 )
 def test_where_nothing_can_be_held_it_says_why_and_the_way_out_and_changes_nothing(live_file, make, message, wishes):
-    body = recorded_rig()
     prop = make()
     before = snapshot(prop)
     with pytest.raises(Refused, match=message):
-        reduce_into_holds(prop, [body], **{"tolerance": TOLERANCE, "radius": RADIUS} | wishes)
+        reduce_into_holds(prop, **{"tolerance": TOLERANCE, "radius": RADIUS} | wishes)
     assert snapshot(prop) == before
     assert not len(prop.constraints)
     assert not len(prop.rigid_motion.bakes)
