@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import Refused, add_layer, key_frames, merge_layer, modes_of, radius_of
+from rigid_motion.animation import Refused, add_layer, key_frames, merge_layer, modes_of, radius_of, write_channel
+from tests.animation.body_oracle import channels
 from tests.animation.bones.rigs import in_turn, new_rig
 from tests.animation.keyed import MODE_IDS, curves_of
 from tests.animation.layered import (
@@ -46,6 +47,21 @@ def update(_=None):
     bpy.context.view_layer.update()
 
 
+def give_layer(carrier, mode="BLENDER", **how):
+    add_layer(carrier)
+    key_offset(carrier, mode, **how)
+    update()
+
+
+def merge_unseen(*carriers, tolerance):
+    """Merge the layer of the last of them, and check that all stay within the tolerance on frames."""
+    expected = [seen(carrier, WHOLE) for carrier in carriers]
+    merged = merge_layer(carriers[-1], tolerance)
+    for carrier, before in zip(carriers, expected, strict=True):
+        assert displaced(seen(carrier, WHOLE), before, radius_of(carrier)).max() < tolerance + 1e-4
+    return merged
+
+
 MODES = [*zip(MODE_IDS, (*MODE_IDS[3:], *MODE_IDS[:3]), strict=True)]
 ORDERS = ("QUATERNION", "XYZ", "ZXY", "YZX")
 
@@ -66,9 +82,8 @@ def test_the_motion_below_times_the_offset_to_the_power_of_the_influence_is_seen
     assert np.abs(expected - before).max() > 0.05
     error = np.abs(seen(carrier) - expected).max()
     assert error < (QUATERNION_PRECISION if order == "QUATERNION" else PRECISION)
-    expected, between = seen(carrier, WHOLE), seen(carrier, EIGHTHS)
-    merged = merge_layer(carrier, 0.005)
-    assert displaced(seen(carrier, WHOLE), expected, radius).max() < 0.005 + 1e-4
+    between = seen(carrier, EIGHTHS)
+    merged = merge_unseen(carrier, tolerance=0.005)
     off = displaced(seen(carrier, EIGHTHS), between, radius).max()
     assert off < max(0.005, 2.0 * merged.between) + 1e-4
     assert {*bpy.data.objects.keys()} == names[0], "the Empty is gone"
@@ -97,9 +112,7 @@ def test_a_layer_at_rest_is_merged_into_the_keys_and_modes_that_there_were(live_
 def test_where_a_layer_leaves_the_motion_its_modes_stay_and_there_are_curves_elsewhere(live_file):
     tool = key_base(new("object", "XYZ"), "dq_sclerp")
     before = seen(tool, EIGHTHS)
-    add_layer(tool)
-    key_offset(tool, frames=(24.0, 30.0, 40.0), size=0.5)
-    update()
+    give_layer(tool, frames=(24.0, 30.0, 40.0), size=0.5)
     merge_layer(tool, 0.002)
     modes = dict(zip(key_frames(tool).tolist(), modes_of(tool, key_frames(tool)), strict=True))
     assert [frame for frame in modes if frame < 24.0] == [1.0, 11.0]
@@ -110,12 +123,10 @@ def test_where_a_layer_leaves_the_motion_its_modes_stay_and_there_are_curves_els
 
 def test_bones_share_a_layer_and_all_else_of_the_rig_plays_on(live_file):
     rig = new_rig("Rig")
-    rig["glow"] = 0.0
     for bone in rig.pose.bones:
         key_base(bone, "dq_sclerp")
-    rig.keyframe_insert('["glow"]', frame=1)
-    rig["glow"] = 1.0
-    rig.keyframe_insert('["glow"]', frame=40)
+    rig["glow"] = 0.0
+    write_channel(rig, '["glow"]', WHOLE[[0, -1]], np.array((0.0, 1.0)))
     poses = {bone.name: seen(bone) for bone in rig.pose.bones}
     bpy.context.scene.frame_set(1)
     add_layer([rig.pose.bones["Upper"]])
@@ -129,12 +140,9 @@ def test_bones_share_a_layer_and_all_else_of_the_rig_plays_on(live_file):
         assert np.abs(seen(bone) - poses[bone.name] @ added).max() < QUATERNION_PRECISION
     bpy.context.scene.frame_set(40)
     assert rig["glow"] == 1.0
-    expected = {bone.name: seen(bone, WHOLE) for bone in rig.pose.bones}
-    merge_layer(rig.pose.bones["Hand"], 0.005)
+    merge_unseen(*rig.pose.bones, tolerance=0.005)
     assert not len(layers_of(rig))
     assert not any(len(bone.constraints) for bone in rig.pose.bones)
-    for bone in rig.pose.bones:
-        assert displaced(seen(bone, WHOLE), expected[bone.name], radius_of(bone)).max() < 0.006
     bpy.context.scene.frame_set(40)
     assert rig["glow"] == 1.0
     assert key_frames(rig.pose.bones["Body"]).tolist() == [*KEYS]
@@ -145,47 +153,32 @@ def test_scale_stays_with_what_is_seen_or_goes_along_where_it_is_keyed_evenly(li
         tool = key_base(new_object(f"Tool {how}"), "cga_slerp", scale=how)
         if how is None:
             tool.scale = 1.0, 2.0, 0.5
-        before, scale = seen(tool), np.array([np.diag((*values, 1.0)) for values in scales_of(tool)])
-        add_layer(tool)
-        key_offset(tool, "dq_sclerp")
-        update()
+        scale = np.array([np.diag((*values, 1.0)) for values in channels(tool, "scale", FRAMES)])
+        before = seen(tool)
+        give_layer(tool, "dq_sclerp")
         added = offsets(tool)
         expected = before @ added if how == "even" else before @ np.linalg.inv(scale) @ added @ scale
         assert np.abs(seen(tool) - expected).max() < 10.0 * QUATERNION_PRECISION
-        whole = seen(tool, WHOLE)
-        merge_layer(tool, 0.005)
-        assert displaced(seen(tool, WHOLE), whole, radius_of(tool)).max() < 0.006
+        merge_unseen(tool, tolerance=0.005)
 
 
-def scales_of(tool):
-    curves = [curves_of(tool).get(("scale", index)) for index in range(3)]
-    return [
-        [tool.scale[index] if curve is None else curve.evaluate(frame) for index, curve in enumerate(curves)]
-        for frame in FRAMES
-    ]
-
-
-def test_a_base_that_repeats_is_merged_over_the_scene(live_file):
+def repeating():
     tool = key_base(new("object", "XYZ"), "dq_sclerp", (1.0, 6.0, 11.0))
     animation.repeat(tool, "REPEAT")
     bpy.context.scene.frame_end = 40
-    add_layer(tool)
-    key_offset(tool)
-    update()
-    expected = seen(tool, WHOLE)
-    merge_layer(tool, 0.005)
+    return tool
+
+
+def stepped():
+    return key_base(new("object", "QUATERNION"), "BLENDER", interpolation="CONSTANT")
+
+
+@pytest.mark.parametrize("make", [repeating, stepped])
+def test_a_base_that_repeats_is_merged_over_the_scene_and_one_that_steps_on_frames(live_file, make):
+    tool = make()
+    give_layer(tool)
+    merge_unseen(tool, tolerance=0.002)
     assert not any(modifier.type == "CYCLES" for curve in curves_of(tool).values() for modifier in curve.modifiers)
-    assert displaced(seen(tool, WHOLE), expected, radius_of(tool)).max() < 0.006
-
-
-def test_stepped_keys_stay_stepped_on_frames(live_file):
-    tool = key_base(new("object", "QUATERNION"), "BLENDER", interpolation="CONSTANT")
-    add_layer(tool)
-    key_offset(tool)
-    update()
-    expected = seen(tool, WHOLE)
-    merge_layer(tool, 0.002)
-    assert displaced(seen(tool, WHOLE), expected, radius_of(tool)).max() < 0.0021
 
 
 def snapshot():
