@@ -10,7 +10,7 @@ from mathutils import Matrix, Quaternion
 
 from rigid_motion.animation import hold_facts, hold_in, refresh, set_mode
 from tests.animation.bones.rigs import HANDS, Rest, key_all, new_rig
-from tests.animation.keyed import Carrier, rotation_path
+from tests.animation.keyed import Carrier, curves_of, rotation_path
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import new_object
 
@@ -60,6 +60,14 @@ def new_prop(kind: str) -> Carrier:
 
 
 KINDS = ("free", "parented", "scaled", "hung", "bone")
+
+
+def raise_keys(carrier: Carrier, by: float) -> None:
+    """Add to the values of all its keys."""
+    for fcurve in curves_of(carrier).values():
+        for point in fcurve.keyframe_points:
+            point.co_ui.y += by
+    bpy.context.view_layer.update()
 
 
 def wander(carrier: Carrier, seed: int, frames: Sequence[float] = (1.0, 20.0, 37.0, 60.0, 90.0)) -> None:

@@ -31,7 +31,7 @@ from rigid_motion.motion.quaternions import angle_between
 from tests.animation.bones.poses import shown_of
 from tests.animation.bones.rigs import PLAYED, in_turn, key_all, new_rig, select_only
 from tests.animation.bones.test_rig_edits import assert_nothing_stale
-from tests.animation.held import KINDS, handled, holders_on, new_hands, new_prop, worlds
+from tests.animation.held import KINDS, handled, holders_on, new_hands, new_prop, raise_keys, worlds
 from tests.animation.keyed import Carrier, curves_of, snapshot
 from tests.animation.scenes import FRAMES, editor, enabled, key, new_object, new_strip, push_down, tweak
 from tests.world_poses import read_poses
@@ -234,13 +234,6 @@ AROUND_SWITCHES = (10, 20, 30, 39, 40, 59, 60, 85)
 HOLDERS = ["", "Hand.L", "Hand.L", "Hand.L", "Hand.R", "Hand.R", "", ""]
 
 
-def turn_a_key(hand: Carrier) -> None:
-    for fcurve in curves_of(hand).values():
-        for point in fcurve.keyframe_points:
-            point.co_ui.y += 0.3
-    bpy.context.view_layer.update()
-
-
 @pytest.mark.parametrize(("kind", "step"), [*((kind, 1.0) for kind in KINDS), ("bone", 7.0)])
 def test_what_is_baked_to_the_world_is_held_no_more_and_shown_as_before(live_file, kind, step):
     prop, hands = new_prop(kind), new_hands()
@@ -254,7 +247,7 @@ def test_what_is_baked_to_the_world_is_held_no_more_and_shown_as_before(live_fil
     assert len(frames) == (80 if step == 1.0 else 19)
     assert np.abs(worlds(prop, frames) - before[frames.astype(int) - 1]).max() < 1e-5
     assert not any(holders_on(prop, AROUND_SWITCHES))
-    turn_a_key(hands[0])
+    raise_keys(hands[0], 0.3)
     assert np.abs(worlds(prop, frames) - before[frames.astype(int) - 1]).max() < 1e-5
     turn_back = worlds(hands[0])
     unbake(prop)

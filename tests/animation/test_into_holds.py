@@ -21,7 +21,7 @@ from rigid_motion.animation import (
     restore_keys,
     set_mode,
 )
-from tests.animation.held import KINDS, holders_on, new_prop, wander, worlds
+from tests.animation.held import KINDS, holders_on, in_holder, new_prop, raise_keys, wander, worlds
 from tests.animation.keyed import Carrier, curves_of, rotation_path, snapshot
 from tests.animation.scenes import new_object, write
 from tests.balls import displaced
@@ -101,13 +101,9 @@ def test_what_hands_held_gets_a_key_for_each_time_and_is_shown_within_the_tolera
         (one.name, one.first, one.last, one.keys_before) for one in (right, left)
     ]
     # It follows the hand, wherever the hand is now.
-    grip = np.linalg.inv(worlds(body.pose.bones["Hand.L"], [45.0])) @ worlds(prop, [45.0])
-    for fcurve in curves_of(body.pose.bones["Hand.L"]).values():
-        for point in fcurve.keyframe_points:
-            point.co_ui.y += 0.1
-    bpy.context.view_layer.update()
-    now = np.linalg.inv(worlds(body.pose.bones["Hand.L"], [55.0])) @ worlds(prop, [55.0])
-    assert np.abs(now - grip).max() < 1e-5
+    grip = in_holder(prop, body.pose.bones["Hand.L"], [45.0])
+    raise_keys(body.pose.bones["Hand.L"], 0.1)
+    assert np.abs(in_holder(prop, body.pose.bones["Hand.L"], [55.0]) - grip).max() < 1e-5
     assert np.abs(worlds(prop, [45.0]) - before[44:45]).max() > 0.01
     restore_keys(prop)
     # Its constraints stay, but have no effect.
