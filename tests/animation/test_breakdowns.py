@@ -11,8 +11,9 @@ from rigid_motion.animation import Breakdowns, Refused, breakdown, set_mode, set
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curves_of, key_frames, snapshot
-from tests.animation.oracle import expected_bases, matrices, shown_worlds, world_now
+from tests.animation.oracle import expected_bases, shown_worlds, world_now
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, random_values
+from tests.motion.bodies import matrices
 
 FACTORS = (-0.3, 0.0, 0.35, 1.0, 1.25)
 BEFORE, NOW, AFTER = 11.0, 17.0, 24.0
@@ -21,11 +22,6 @@ BEFORE, NOW, AFTER = 11.0, 17.0, 24.0
 def key_poses(obj: bpy.types.Object) -> Poses:
     """Return the poses that `key` set on an object, with its delta transforms."""
     return Poses.from_matrices(expected_bases(obj, FRAMES))
-
-
-def as_matrices(poses: Poses) -> np.ndarray:
-    scales = np.ones(len(poses)) if poses.scales is None else poses.scales
-    return matrices(poses.positions, poses.quaternions, np.repeat(scales[:, None], 3, axis=1))
 
 
 def on_path(keys: Poses, mode: str, factor: float, times=FRAMES) -> Poses:
@@ -54,7 +50,7 @@ def test_a_breakdown_is_on_the_path_of_the_mode(live_file, mode, what):
         if KEYFRAME_MODES[mode].is_smooth and not 0.0 <= factor <= 1.0:
             continue
         tries.apply(factor)
-        expected = as_matrices(on_path(keys, mode, factor))[0] @ np.diag((0.8, 0.8, 0.8, 1.0))
+        expected = matrices(on_path(keys, mode, factor))[0] @ np.diag((0.8, 0.8, 0.8, 1.0))
         np.testing.assert_allclose(world_now(), expected, atol=2e-5 * np.abs(expected).max())
         assert key_frames(obj).tolist() == [FRAMES[0], BEFORE, NOW, AFTER, FRAMES[3]]
         # It is a key like any other: it stays when the frame changes.
@@ -85,15 +81,15 @@ def test_push_and_relax_go_from_the_pose_that_is_seen_along_the_mode(live_file, 
     keys = key_poses(obj)
     share = (NOW - BEFORE) / (AFTER - BEFORE)
     between = on_path(keys, mode, share)
-    np.testing.assert_allclose(world_now(), as_matrices(between)[0], atol=2e-5)
+    np.testing.assert_allclose(world_now(), matrices(between)[0], atol=2e-5)
     obj.location = np.add(obj.location, (0.4, -0.3, 0.2))
     bpy.context.view_layer.update()
     seen = world_now()
     breakdown(obj, 0.3, kind)
-    ends = Poses.from_matrices(np.concatenate((seen[None], as_matrices(between))))
+    ends = Poses.from_matrices(np.concatenate((seen[None], matrices(between))))
     factor = -0.3 if kind == "PUSH" else 0.3
     expected = interpolate((0.0, 1.0), ends, np.array([factor]), mode, extrapolate=True)
-    np.testing.assert_allclose(world_now(), as_matrices(expected)[0], atol=3e-5 * max(1.0, np.abs(seen).max()))
+    np.testing.assert_allclose(world_now(), matrices(expected)[0], atol=3e-5 * max(1.0, np.abs(seen).max()))
 
 
 @pytest.mark.parametrize("frame", [-3, 1, 40, 55])
@@ -121,7 +117,7 @@ def test_a_breakdown_leaves_the_path_and_changes_when_the_body_is_there(live_fil
     key(obj, seed=5, interpolation="LINEAR")
     set_mode(obj, mode)
     times = np.linspace(BEFORE, AFTER, 2001)
-    path = as_matrices(interpolate(FRAMES, key_poses(obj), times, mode))
+    path = matrices(interpolate(FRAMES, key_poses(obj), times, mode))
     beside = shown_worlds([obj], [*range(1, 11), *range(25, 41)])[0]
     bpy.context.scene.frame_set(int(NOW))
     breakdown(obj, 0.8)

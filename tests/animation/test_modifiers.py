@@ -19,8 +19,9 @@ from rigid_motion.animation.fcurves.keys import Cycles
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curves_of, key_frames, rotation_path, snapshot
-from tests.animation.oracle import assert_near, expected_bases, matrices, shown_worlds
+from tests.animation.oracle import assert_near, expected_bases, shown_worlds
 from tests.animation.scenes import give_own_deltas, key, key_densely, new_object, random_values
+from tests.motion.bodies import matrices
 
 PLAYED, IN_ROUNDS = np.arange(1.0, 40.0, 0.25), np.arange(-60.0, 120.0, 0.5)
 RANGE = {"use_restricted_range": True, "frame_start": 7.0, "frame_end": 31.0, "blend_in": 5.0}
@@ -223,8 +224,7 @@ def test_a_smooth_mode_flows_on_from_round_to_round(live_file, kind):
     rounds, keys = np.arange(-4, 6)[:, None], np.array(FRAMES[:-1])
     times = (rounds * (FRAMES[-1] - FRAMES[0]) + (keys if kind != "MIRROR" else MIRRORED[rounds[:, 0] % 2])).ravel()
     poses = Poses.from_matrices(unrolled(obj, kind, kind, 0, times, seams=True))
-    expected = interpolate(times, poses, AROUND, "motor_spline")
-    placed = matrices(expected.positions, expected.quaternions, np.ones((len(AROUND), 3)))
+    placed = matrices(interpolate(times, poses, AROUND, "motor_spline"))
     assert np.abs(shown - placed).max() < 1e-5 * np.abs(placed).max()
 
 
