@@ -19,15 +19,7 @@ from mathutils import Matrix
 
 from rigid_motion import animation
 from rigid_motion.animation import modes_of, set_mode
-from tests.animation.bones.rigs import (
-    HANDS,
-    in_turn,
-    new_rig,
-    own_clipboard,
-    pose_mode,
-    select_bones,
-    select_only,
-)
+from tests.animation.bones.rigs import HANDS, in_turn, new_rig, own_clipboard, pose_mode, select_bones, select_only
 from tests.animation.keyed import Carrier, curves_of, rotation_path, transform_paths
 from tests.animation.oracle import assert_near
 from tests.animation.scenes import editor, give_own_deltas, key, key_densely, new_object, push_down
@@ -205,10 +197,7 @@ OF_BONES: dict[str, Command] = {
 }
 """Commands of each kind: those that use displayed poses, channels or keys."""
 
-CASES = [
-    *itertools.product(["OBJECT"], (*COMMANDS, *OF_OBJECTS)),
-    *itertools.product(["BONE"], (*COMMANDS, *OF_BONES)),
-]
+CASES = [*itertools.product(["OBJECT"], (*COMMANDS, *OF_OBJECTS)), *itertools.product(["BONE"], (*COMMANDS, *OF_BONES))]
 
 
 def left_by(command: str, kind: str, order: str, auto: str, *, of_twins: bool) -> list[np.ndarray]:
