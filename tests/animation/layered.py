@@ -63,17 +63,12 @@ def key_base(carrier: Carrier, mode: str, frames: Sequence[float] = KEYS, **how)
 
 def key_offset(carrier: Carrier, mode: str = "BLENDER", frames: Sequence[float] = OFFSET_KEYS, size: float = 0.3):
     """Key a layer whose strip is in tweak mode. At the first of these frames the layer is at rest."""
-    random, path = np.random.default_rng(5), rotation_path(carrier)
-    turns = size * random.normal(size=(len(frames), 3))
-    turns[0] = 0.0
-    places = np.vstack([np.zeros(3), size * random.normal(size=(len(frames) - 1, 3))])
-    order = carrier.rotation_mode
-    rotations = {
-        "QUATERNION": [Euler(turn).to_quaternion() for turn in turns],
-        "AXIS_ANGLE": [(np.linalg.norm(turn), *(turn if turn.any() else (0.0, 1.0, 0.0))) for turn in turns],
-    }.get(order, turns)
+    turns, places = size * np.random.default_rng(5).normal(size=(2, len(frames), 3))
+    turns[0] = places[0] = 0.0
+    if carrier.rotation_mode == "QUATERNION":
+        turns = np.array([Euler(turn).to_quaternion() for turn in turns])
     write(carrier, "location", np.array(frames), places, "BEZIER")
-    write(carrier, path, np.array(frames), np.array(rotations), "BEZIER")
+    write(carrier, rotation_path(carrier), np.array(frames), turns, "BEZIER")
     set_mode(carrier, mode)
 
 
