@@ -97,10 +97,8 @@ def offsets(carrier: Carrier, frames: np.ndarray = FRAMES) -> np.ndarray:
         place = Vector(curves["location", index].evaluate(frame) for index in range(3)) * power * (not connected)
         numbers = [curves[path, index].evaluate(frame) for index in range(4 if order == "QUATERNION" else 3)]
         if order == "QUATERNION":
-            w, *xyz = np.array(numbers) / np.linalg.norm(numbers) * np.sign(numbers[0])
-            size = np.linalg.norm(xyz)
-            angle = 2.0 * power * np.arctan2(size, w)
-            turn = Quaternion(np.array(xyz) / (size or 1.0), angle)
+            whole = Quaternion(numbers).normalized()
+            turn = Quaternion(whole.axis, power * whole.angle)
         else:
             turn = Euler(np.array(numbers) * power, order).to_quaternion()
         result.append(np.array(Matrix.LocRotScale(place, turn, None)))
