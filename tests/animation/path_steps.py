@@ -17,7 +17,7 @@ from rigid_motion.animation.evaluation.marks import near
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.motion.affine import AffineMaps
 from tests.animation.body_oracle import DEPENDS_ON_KEYS, location_axes
-from tests.animation.keyed import WIDTHS, curve_of, key_frames, mode_at, moving_curves, transform_paths
+from tests.animation.keyed import WIDTHS, key_frames, mode_at, moving_curves, moving_in, transform_paths
 from tests.animation.machine import TURNS, Name, seeds, shares, while_on
 from tests.animation.oracle import assert_near, shown_worlds
 from tests.animation.tool_steps import WithTools
@@ -66,13 +66,9 @@ class WithPaths(WithTools):
             return
         delta = Matrix.Translation(random.normal(size=3))
         delta = np.array(delta @ Euler(random.normal(size=3)).to_matrix().to_4x4() if how == "turn" else delta)
-        stay = self._frames_that_stay(name, how, chosen)
+        stay = self._frames_that_stay(name, how, chosen, is_free=is_free)
         before, poses, worlds = self._keyed()[name], self._expected(name, stay), shown_worlds([obj], keys)[0]
-        is_possible = how in ("insert", "delete") or any(
-            curve_of(obj, path, index) in moving_curves(obj)
-            for path in transform_paths(obj)[:2]
-            for index in range(WIDTHS[path])
-        )
+        is_possible = how in ("insert", "delete") or any(moving_in(obj, path) for path in transform_paths(obj)[:2])
         refused: list[animation.Refused] = []
 
         def is_chosen(x: float) -> bool:
@@ -161,8 +157,7 @@ class WithPaths(WithTools):
     def _is_whole(self, name: Name) -> bool:
         """Whether all channels of location and rotation are keyed and unmuted."""
         carrier = self._found(name)
-        curves = [curve_of(carrier, path, i) for path in transform_paths(carrier)[:2] for i in range(WIDTHS[path])]
-        return all(curve in moving_curves(carrier) for curve in curves)
+        return all(len(moving_in(carrier, path)) == WIDTHS[path] for path in transform_paths(carrier)[:2])
 
     def _spaces(self, name: Name, frames: np.ndarray) -> KeySpaces | None:
         """Return the spaces of the channels on frames, from the displayed pose; None if a basis is singular."""
@@ -182,24 +177,16 @@ class WithPaths(WithTools):
             np.ones(len(frames)),
         )
 
-    def _frames_that_stay(self, name: Name, how: str, chosen: np.ndarray) -> np.ndarray:
-        """Return the frames on which the motion must not change, whatever happens to the chosen keys (n,)."""
+    def _frames_that_stay(self, name: Name, how: str, chosen: np.ndarray, *, is_free: bool) -> np.ndarray:
+        """Return the frames on which the motion must not change, whatever happens to the chosen keys (n,).
+
+        Handles that are not free follow the keys.
+        """
         carrier = self._found(name)
         keys, modes = key_frames(carrier), {mode_at(carrier, key) for key in key_frames(carrier)}
         if how == "insert":
             return self._frames_kept_by_a_key(name)
-        types = {
-            t
-            for c in moving_curves(carrier)
-            for k in c.keyframe_points
-            for t in (k.handle_left_type, k.handle_right_type)
-        }
-        if (
-            not DEPENDS_ON_KEYS.isdisjoint(modes)
-            or not types <= {"FREE"}
-            or len(self._timings(name)) > 1
-            or not self._is_whole(name)
-        ):
+        if not is_free or DEPENDS_ON_KEYS & modes or len(self._timings(name)) > 1 or not self._is_whole(name):
             return np.empty(0)
         at = np.arange(keys[0], keys[-1], 0.5)
         behind = np.clip(np.searchsorted(keys, at, side="right"), 1, len(keys) - 1)
