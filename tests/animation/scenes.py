@@ -60,6 +60,25 @@ def write(carrier: Carrier, path: str, frames: np.ndarray, values: np.ndarray, i
     write_channel(carrier.id_data, carrier.path_from_id(path), frames, values, interpolation=interpolation, group=group)
 
 
+def turning(
+    name: str, degrees: Sequence[float], frames: Sequence[float], rotation_mode: str = "QUATERNION", sign: float = 1.0
+) -> bpy.types.Object:
+    """Return an object that turns about z to these angles and moves 2 along x per key. Every second key has `sign`."""
+    obj, angles, count = new_object(name, rotation_mode), np.radians(degrees), np.arange(len(frames))
+    write_channel(obj, "location", np.array(frames), np.outer(count, (2.0, 0.0, 0.0)))
+    if rotation_mode == "QUATERNION":
+        columns = np.cos(angles / 2.0), 0.0 * angles, 0.0 * angles, np.sin(angles / 2.0)
+        write_channel(
+            obj,
+            "rotation_quaternion",
+            np.array(frames),
+            np.transpose(columns) * np.where(count % 2, sign, 1.0)[:, None],
+        )
+    elif rotation_mode != "AXIS_ANGLE":
+        write_channel(obj, "rotation_euler", np.array(frames), np.outer(angles, (0.0, 0.0, 1.0)))
+    return obj
+
+
 def key_densely(obj: Carrier) -> None:
     """Replace a carrier's keys by linear ones on all eighths of frames, at the displayed values, without modes."""
     curves = list(curves_of(obj).values())

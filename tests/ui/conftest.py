@@ -10,7 +10,7 @@ import pytest
 
 from rigid_motion.ui.overlay import drawing
 from tests.animation.keyed import curves_of
-from tests.animation.scenes import new_object, write
+from tests.animation.scenes import turning
 from tests.complaints import complaints
 
 FRAMES = np.array((1.0, 11.0, 21.0, 41.0))
@@ -34,13 +34,9 @@ def tool(extension) -> bpy.types.Object:
     return keyed("Tool")
 
 
-def keyed(name: str) -> bpy.types.Object:
+def keyed(name: str, rotation_mode: str = "QUATERNION") -> bpy.types.Object:
     """Return a selected, active object that moves along x and turns a quarter about z from key to key."""
-    obj, count = new_object(name), np.arange(len(FRAMES))
-    halves = 0.25 * np.pi * count
-    write(obj, "location", FRAMES, np.outer(count, (2.0, 0.0, 0.0)))
-    turns = np.column_stack((np.cos(halves), 0.0 * halves, 0.0 * halves, np.sin(halves)))
-    write(obj, "rotation_quaternion", FRAMES, turns)
+    obj = turning(name, 90.0 * np.arange(len(FRAMES)), FRAMES, rotation_mode)
     obj.select_set(True)
     bpy.context.view_layer.objects.active = obj
     return obj
