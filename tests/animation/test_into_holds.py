@@ -34,10 +34,10 @@ GRIP = np.array(Matrix.LocRotScale((0.02, 0.1, 0.03), Quaternion((0.9, 0.2, 0.3,
 OTHER = np.array(Matrix.LocRotScale((0.05, 0.08, -0.02), Quaternion((0.3, -0.2, 0.8, 0.4)).normalized(), None))
 
 
-def record(prop: Carrier, places: np.ndarray, frames: np.ndarray = FRAMES) -> None:
+def record(prop: Carrier, places: np.ndarray) -> None:
     """Key the carrier at these world matrices, on every frame."""
     scene = bpy.context.scene
-    for frame, place in zip(frames.tolist(), places, strict=True):
+    for frame, place in zip(FRAMES.tolist(), places, strict=True):
         scene.frame_set(int(frame))
         if prop == prop.id_data:
             prop.matrix_world = Matrix(place.tolist())
@@ -52,14 +52,14 @@ def record(prop: Carrier, places: np.ndarray, frames: np.ndarray = FRAMES) -> No
     scene.frame_set(1)
 
 
-def moved(seed: int = 0, noise: float = NOISE, pick: int = 20, put_down: int = 60, over: int = 40) -> np.ndarray:
+def moved(pick: int = 20, put_down: int = 60, over: int = 40) -> np.ndarray:
     """Return the matrices of a tool that rests, is held in the right hand, passed to the left one, and put down."""
     body = bpy.data.objects["Body"].pose.bones
     right, left = worlds(body["Hand.R"], FRAMES) @ GRIP, worlds(body["Hand.L"], FRAMES) @ OTHER
     number = np.clip(FRAMES, pick, put_down)
     held = number.astype(int) - 1
     places = np.where((number < over)[:, None, None], right[held], left[held])
-    places[:, :3, 3] += np.random.default_rng(seed).uniform(-noise, noise, (len(FRAMES), 3))
+    places[:, :3, 3] += np.random.default_rng(0).uniform(-NOISE, NOISE, (len(FRAMES), 3))
     return places
 
 

@@ -33,18 +33,18 @@ PLACES = np.array(((0, 0, 0), (3, 1, 0), (4, 2, 2), (1, 6, 3), (0, 7, 0)), float
 ANGLES = np.radians(((0, 0, 0), (20, 50, 0), (40, 20, 60), (0, 80, 90), (10, 20, 60)))
 
 
-def tool(mode: str, interpolation: str = "BEZIER", angles: np.ndarray = ANGLES) -> bpy.types.Object:
+def tool(mode: str, interpolation: str = "BEZIER") -> bpy.types.Object:
     obj = new_object()
     write(obj, "location", np.array(FRAMES), PLACES, interpolation)
-    turns = np.array([Euler(one).to_quaternion() for one in angles])
+    turns = np.array([Euler(one).to_quaternion() for one in ANGLES])
     write(obj, "rotation_quaternion", np.array(FRAMES), turns, interpolation)
     set_mode(obj, mode)
     return obj
 
 
-def played(obj: bpy.types.Object, first: float = FRAMES[0], last: float = FRAMES[-1]) -> tuple[np.ndarray, np.ndarray]:
+def played(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     """Return frames and world matrices."""
-    frames = np.arange(first, last + STEP / 2.0, STEP)
+    frames = np.arange(FRAMES[0], FRAMES[-1] + STEP / 2.0, STEP)
     return frames, shown_worlds([obj], frames)[0]
 
 
