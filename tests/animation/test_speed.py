@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import bpy
 import numpy as np
@@ -13,14 +12,17 @@ from mathutils import Euler
 from rigid_motion.animation import Refused, equalise_speed, key_frames, modes_of, set_mode, set_turns
 from rigid_motion.animation.edits.speed import on_whole_frames
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from rigid_motion.motion.quaternions import angle_between
 from tests.animation.bones.rigs import in_turn
+from tests.animation.held import worlds
 from tests.animation.keyed import curves_of, snapshot
-from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import FRAMES as FEW_FRAMES
 from tests.animation.scenes import key, new_object, write
 
 FRAMES = (1.0, 9.0, 33.0, 41.0, 81.0)
-STEP = 1.0 / 16.0
+MOMENTS = np.arange(1.0, 81.03125, 0.0625)
+"""Sixteenths of frames."""
+
 SHARES = {
     "CONSTANT": lambda t: t,
     "EASE_IN": lambda t: t * t * (3.0 - t) / 2.0,
@@ -42,19 +44,17 @@ def tool(mode: str, interpolation: str = "BEZIER") -> bpy.types.Object:
     return obj
 
 
-def played(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
-    """Return frames and world matrices."""
-    frames = np.arange(FRAMES[0], FRAMES[-1] + STEP / 2.0, STEP)
-    return frames, shown_worlds([obj], frames)[0]
+def places_of(obj: bpy.types.Object) -> np.ndarray:
+    return worlds(obj, MOMENTS)[:, :3, 3]
 
 
-def ways(worlds: np.ndarray) -> np.ndarray:
-    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(worlds[:, :3, 3], axis=0), axis=1)))
+def ways(places: np.ndarray) -> np.ndarray:
+    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
 
 
-def path_of(worlds: Sequence[np.ndarray], mode: str) -> np.ndarray:
+def path_of(matrices: Sequence[np.ndarray], mode: str) -> np.ndarray:
     """Return positions on the path from key to key, by interpolating two poses at a time."""
-    keys, shares = Poses.from_matrices(np.array(worlds)), np.linspace(0.0, 1.0, 4001)
+    keys, shares = Poses.from_matrices(np.array(matrices)), np.linspace(0.0, 1.0, 4001)
     parts = [interpolate((0.0, 1.0), keys[i : i + 2], shares, mode).positions for i in range(len(keys.positions) - 1)]
     return np.concatenate(parts)
 
@@ -73,21 +73,20 @@ def off_path(points: np.ndarray, line: np.ndarray) -> float:
 
 def unevenness(obj: bpy.types.Object, ease: str) -> float:
     """Return the largest deviation of Blender's speed from the intended speed, as a fraction of the mean."""
-    frames, worlds = played(obj)
-    keys, done = key_frames(obj), ways(worlds)
-    meant = np.diff(SHARES[ease]((frames - frames[0]) / (frames[-1] - frames[0]))) * done[-1]
+    keys, done = key_frames(obj), ways(places_of(obj))
+    meant = np.diff(SHARES[ease]((MOMENTS - 1.0) / 80.0)) * done[-1]
     # Steps across a key cut the corner and say nothing about speed.
-    whole = ~np.any((keys[:, None] > frames[:-1]) & (keys[:, None] < frames[1:]), axis=0)
+    whole = ~np.any((keys[:, None] > MOMENTS[:-1]) & (keys[:, None] < MOMENTS[1:]), axis=0)
     return float(np.abs(np.diff(done) - meant)[whole].max() / meant.mean())
 
 
 @pytest.mark.parametrize(("mode", "ease"), in_turn(FOR_MODES, [*SHARES]))
 def test_the_speed_is_even_and_the_path_stays(live_file, mode, ease):
     obj = tool(mode)
-    expected = path_of(shown_worlds([obj], FRAMES)[0], mode)
+    expected = path_of(worlds(obj, FRAMES), mode)
     (result,) = equalise_speed(obj, ease, between_frames=True).values()
-    _, worlds = played(obj)
-    assert off_path(worlds[::4, :3, 3], expected) < 1e-5
+    places = places_of(obj)
+    assert off_path(places[::4], expected) < 1e-5
     assert result.bend < 1e-4
     assert key_frames(obj)[[0, -1]].tolist() == [1.0, 81.0]
     assert modes_of(obj, key_frames(obj)[:-1]) == [mode] * 4
@@ -95,7 +94,7 @@ def test_the_speed_is_even_and_the_path_stays(live_file, mode, ease):
     # Two handles describe a timing that is faster half-way almost exactly; here the body turns by up to 110 degrees.
     assert uneven < (0.08 if mode in BLENDS else 0.01)
     assert result.unevenness == pytest.approx(uneven, abs=0.005)
-    assert result.speed == pytest.approx(ways(worlds)[-1] / 80.0, rel=1e-3)
+    assert result.speed == pytest.approx(ways(places)[-1] / 80.0, rel=1e-3)
 
 
 @pytest.mark.parametrize("mode", FOR_MODES[::3])
@@ -112,10 +111,10 @@ def test_keys_stay_on_whole_frames_unless_asked_for(live_file, mode):
 @pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER", "SINE"])
 def test_blenders_own_in_betweens_keep_their_path(live_file, interpolation):
     obj = tool("BLENDER", interpolation)
-    before = played(obj)[1][:, :3, 3]
+    before = places_of(obj)
     was = unevenness(obj, "CONSTANT")
     (result,) = equalise_speed(obj, between_frames=True).values()
-    after = played(obj)[1][:, :3, 3]
+    after = places_of(obj)
     assert off_path(after, before) < (2e-3 if interpolation == "BEZIER" else 1e-5)  # by chords of the samples
     # Where values stay, the two handles have only their times to shape the speed.
     assert unevenness(obj, "CONSTANT") < (0.25 * was if interpolation == "BEZIER" else 0.01)
@@ -125,20 +124,19 @@ def test_blenders_own_in_betweens_keep_their_path(live_file, interpolation):
 @pytest.mark.parametrize("mode", [name for name, mode in KEYFRAME_MODES.items() if mode.is_smooth])
 def test_a_smooth_mode_is_evened_and_how_far_it_bends_is_said(live_file, mode):
     obj = tool(mode)
-    before = played(obj)[1][:, :3, 3]
+    before = places_of(obj)
     was = unevenness(obj, "CONSTANT")
     (result,) = equalise_speed(obj, between_frames=True).values()
     assert unevenness(obj, "CONSTANT") < 0.2 < 0.05 * was
-    assert result.bend == pytest.approx(off_path(played(obj)[1][:, :3, 3], before), abs=0.02)
+    assert result.bend == pytest.approx(off_path(places_of(obj), before), abs=0.02)
 
 
 def test_between_two_keys_what_is_before_and_behind_them_stays(live_file):
     obj = tool("dq_sclerp")
-    frames, before = played(obj)
+    outside = MOMENTS[(MOMENTS <= 9.0) | (MOMENTS >= 41.0)]
+    before = worlds(obj, outside)
     equalise_speed(obj, frames=(9.0, 33.0, 41.0))
-    _, after = played(obj)
-    outside = (frames <= 9.0) | (frames >= 41.0)
-    np.testing.assert_allclose(after[outside], before[outside], atol=1e-5)
+    np.testing.assert_allclose(worlds(obj, outside), before, atol=1e-5)
     assert key_frames(obj)[[0, 1, 3, 4]].tolist() == [1.0, 9.0, 41.0, 81.0]
     assert key_frames(obj)[2] != 33.0
 
@@ -150,7 +148,7 @@ def test_what_rests_rests_as_long_as_before(live_file):
     set_mode(obj, "dq_sclerp")
     equalise_speed(obj)
     assert key_frames(obj).tolist() == [1.0, 5.0, 25.0, 41.0]
-    (at,) = shown_worlds([obj], (3.0, 15.0, 33.0))
+    at = worlds(obj, (3.0, 15.0, 33.0))
     assert at[:, 0, 3] == pytest.approx((0.5, 1.0, 3.0), abs=1e-5)
 
 
@@ -163,7 +161,7 @@ def test_what_only_turns_turns_evenly_and_its_turns_go_along(live_file):
     assert result.is_turning
     assert result.speed == pytest.approx(0.05, rel=1e-3)
     assert key_frames(obj).tolist() == [1.0, 11.0, 31.0]
-    (at,) = shown_worlds([obj], (6.0, 21.0))
+    at = worlds(obj, (6.0, 21.0))
     assert np.arctan2(at[:, 1, 0], at[:, 0, 0]) == pytest.approx((0.25, 1.0), abs=1e-4)
     set_turns(obj, 1, (11.0,))
     equalise_speed(obj)
@@ -175,12 +173,10 @@ def test_what_only_turns_turns_evenly_and_its_turns_go_along(live_file):
 def test_the_turning_is_evened_where_asked_for(live_file):
     obj = tool("lerp_slerp")
     equalise_speed(obj, turning=True, between_frames=True)
-    frames, worlds = played(obj)
-    turned = np.array(
-        [np.arccos(np.clip((np.trace(a[:3, :3].T @ b[:3, :3]) - 1) / 2, -1, 1)) for a, b in pairwise(worlds[::16])]
-    )
-    keys = key_frames(obj)
-    whole = ~np.any((keys[:, None] > frames[:-1:16]) & (keys[:, None] < frames[16::16]), axis=0)
+    frames, keys = MOMENTS[::16], key_frames(obj)
+    turns = Poses.from_matrices(worlds(obj, frames)).quaternions
+    turned = angle_between(turns[1:], turns[:-1])
+    whole = ~np.any((keys[:, None] > frames[:-1]) & (keys[:, None] < frames[1:]), axis=0)
     assert np.ptp(turned[whole]) < 0.01 * turned.mean()
 
 
