@@ -40,6 +40,12 @@ def all_driven(obj: bpy.types.Object) -> None:
         obj.driver_add(path, index).driver.expression = "0.1 * frame"
 
 
+def repeating_apart(obj: bpy.types.Object) -> None:
+    for fcurve in curves_of(obj).values():
+        add_cycles(fcurve, Cycles("REPEAT", "REPEAT", 0, 0))
+    curves_of(obj)["location", 2].keyframe_points[-1].co_ui.x += 1.0
+
+
 HINDRANCES = {
     "envelope": (
         lambda obj: curves_of(obj)["location", 1].modifiers.new("ENVELOPE"),
@@ -58,6 +64,7 @@ HINDRANCES = {
         lambda obj: add_cycles(curves_of(obj)["location", 2], Cycles("REPEAT", "REPEAT", 0, 0)),
         "repeats, but its channels differ",
     ),
+    "cycles of another length": (repeating_apart, "repeats, but its channels differ"),
 }
 """What to do to an object, and the refusal it causes."""
 
