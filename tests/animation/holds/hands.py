@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 
 import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion
 
-from rigid_motion.animation import hold_in, write_channel
+from rigid_motion.animation import hold_in
 from tests.animation.bones.rigs import Rest, new_rig
-from tests.animation.holds.oracle import Carrier
-from tests.animation.keyed import rotation_path
-from tests.animation.scenes import new_object, push_down
+from tests.animation.keyed import Carrier, rotation_path
+from tests.animation.scenes import new_object, push_down, write
 
 MOVES = np.array((1.0, 13.0, 22.0, 31.0, 46.0, 60.0, 80.0))
 """The key frames of hands."""
@@ -29,21 +27,19 @@ ARMS = (
 """An arm on a body, and twice the same bone on the body, which is a prop."""
 
 
-def wander(carrier: Carrier, seed: int, reach: float = 0.3, *, turns: bool = True, scale: bool = False) -> None:
+def wander(carrier: Carrier, seed: int, reach: float = 0.3, *, scale: bool = False) -> None:
     """Key location (not of bones if `reach` is 0) and rotation at random."""
     random = np.random.default_rng(seed)
-    group = "" if carrier == carrier.id_data else carrier.name
     carrier.rotation_mode = "QUATERNION"
     channels = {}
     if reach:
         channels["location"] = reach * random.uniform(-1.0, 1.0, (len(MOVES), 3))
-    if turns:
-        values = random.normal((2.0, 0.0, 0.0, 0.0), size=(len(MOVES), 4))
-        channels["rotation_quaternion"] = values / np.linalg.norm(values, axis=1, keepdims=True)
+    values = random.normal((2.0, 0.0, 0.0, 0.0), size=(len(MOVES), 4))
+    channels["rotation_quaternion"] = values / np.linalg.norm(values, axis=1, keepdims=True)
     if scale:
         channels["scale"] = np.repeat(np.exp(0.3 * random.normal(size=(len(MOVES), 1))), 3, axis=1)
     for path, values in channels.items():
-        write_channel(carrier.id_data, carrier.path_from_id(path), MOVES, values, interpolation="BEZIER", group=group)
+        write(carrier, path, MOVES, values, "BEZIER")
 
 
 def arm(name: str, seed: int = 0, **settings: object) -> bpy.types.Object:
@@ -182,12 +178,6 @@ PROPS: dict[str, Callable[[], tuple[Carrier, Carrier]]] = {
     "bone of a scaled rig": bone_of_a_scaled_rig,
 }
 """Props, and for each a twin that rests at the origin of the space of the prop's channels."""
-
-
-def pairs(cases: dict, others: dict) -> list[tuple[str, str]]:
-    """Pair the keys of both, each used at least once."""
-    count = max(len(cases), len(others))
-    return list(itertools.islice(zip(itertools.cycle(cases), itertools.cycle(others), strict=False), count))
 
 
 def units(prop: Carrier) -> float:

@@ -13,8 +13,6 @@ import numpy as np
 from tests.animation.keyed import Carrier
 from tests.animation.oracle import shown_worlds
 
-__all__ = ["Carrier"]
-
 POINTS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * (*3 * (0.1 / 3**0.5,), 1.0)
 """Points on a held prop, 10 cm from its origin."""
 

@@ -5,28 +5,20 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from tests.animation.holds.oracle import Carrier, Motion
-from tests.animation.keyed import WIDTHS, curves_of
+from rigid_motion.animation import channelbag_of
+from tests.animation.holds.oracle import Motion
+from tests.animation.keyed import WIDTHS, Carrier, curves_of, key_frames
 from tests.animation.oracle import expected_bases
 
-COPIED = (
-    "co",
-    "handle_left_type",
-    "handle_right_type",
-    "handle_left",
-    "handle_right",
-    *("interpolation", "easing", "period", "type", "back", "amplitude"),
-)
-
-
 AUTOMATIC = {"AUTO", "AUTO_CLAMPED"}
+TURNS = "rigid_motion.turns"
 
 
 def motion_of(prop: Carrier, first: float, until: float, *, comes: bool, goes: bool) -> Motion:
     """Return the motion of the keys from one frame until another. Outside them it extrapolates, or rests."""
     copy = copy_of(prop, first, until, comes=comes, goes=goes)
-    frames = [key.co.x for curve in curves_of(copy).values() for key in curve.keyframe_points]
-    low, high = -np.inf if comes else min(frames), np.inf if goes else max(frames)
+    frames = key_frames(copy)
+    low, high = -np.inf if comes else frames[0], np.inf if goes else frames[-1]
 
     def motion(at: np.ndarray) -> np.ndarray:
         return expected_bases(copy, np.clip(at, low, high))
@@ -36,37 +28,38 @@ def motion_of(prop: Carrier, first: float, until: float, *, comes: bool, goes: b
 
 def copy_of(prop: Carrier, first: float, until: float, *, comes: bool, goes: bool) -> Carrier:
     """Return another object that has only these keys."""
-    copy = bpy.data.objects.new("Copy", None)
+    copy, own = bpy.data.objects.new("Copy", None), prop.id_data.animation_data
     copy.rotation_mode = prop.rotation_mode
-    action = bpy.data.actions.new("Copy")
     data = copy.animation_data_create()
-    data.action = action
-    data.action_slot = slot = action.slots.new("OBJECT", "Copy")
-    bag = action.layers.new("Layer").strips.new(type="KEYFRAME").channelbag(slot, ensure=True)
-    for (path, index), curve in curves_of(prop).items():
-        if path in (*WIDTHS, "rigid_motion.turns"):
-            everywhere = path not in WIDTHS
-            keys = [key for key in curve.keyframe_points if everywhere or first - 0.005 < key.co.x < until - 0.005]
-            if not keys:
-                getattr(copy, path)[index] = curve.evaluate(first)
-                continue
-            made = bag.fcurves.new(path, index=index)
-            made.keyframe_points.add(len(keys))
-            for key, new in zip(keys, made.keyframe_points, strict=True):
-                for name in COPIED:
-                    setattr(new, name, getattr(key, name))
-            made.update()
-            if (comes or goes) and len(keys) > 1 and not everywhere:
-                # Inner keys stay unchanged where the motion rests at both ends.
-                automatic = [{key.handle_left_type, key.handle_right_type} <= AUTOMATIC for key in keys]
-                for key in made.keyframe_points:
-                    key.handle_left_type = key.handle_right_type = "FREE"
-                first_two, last_two = made.keyframe_points[:2], made.keyframe_points[:][-2:]
-                if automatic[0]:
-                    _aim(first_two[0], first_two[1], level=not comes)
-                if automatic[-1]:
-                    _aim(last_two[1], last_two[0], level=not goes)
-                made.extrapolation = "LINEAR"
+    data.action = own.action.copy()
+    data.action_slot = data.action.slots[own.action_slot.identifier]
+    paths = {curve.data_path: path for (path, _), curve in curves_of(prop).items() if path in (*WIDTHS, TURNS)}
+    fcurves = channelbag_of(copy).fcurves
+    for other in [curve for curve in fcurves if curve.data_path not in paths]:
+        fcurves.remove(other)
+    for curve in fcurves:
+        path, keys = paths[curve.data_path], curve.keyframe_points
+        curve.data_path, curve.extrapolation, at_first = path, "CONSTANT", curve.evaluate(first)
+        if path == TURNS:
+            continue
+        for key in reversed(keys):
+            if not first - 0.005 < key.co.x < until - 0.005:
+                keys.remove(key)
+        if not len(keys):
+            getattr(copy, path)[curve.array_index] = at_first
+            continue
+        curve.update()
+        if (comes or goes) and len(keys) > 1:
+            # Inner keys stay unchanged where the motion rests at both ends.
+            automatic = [{key.handle_left_type, key.handle_right_type} <= AUTOMATIC for key in keys]
+            for key in curve.keyframe_points:
+                key.handle_left_type = key.handle_right_type = "FREE"
+            first_two, last_two = curve.keyframe_points[:2], curve.keyframe_points[:][-2:]
+            if automatic[0]:
+                _aim(first_two[0], first_two[1], level=not comes)
+            if automatic[-1]:
+                _aim(last_two[1], last_two[0], level=not goes)
+            curve.extrapolation = "LINEAR"
     return copy
 
 

@@ -13,8 +13,9 @@ from mathutils import Quaternion
 from rigid_motion import animation
 from tests.animation.farm import played_on_a_farm
 from tests.animation.holds.hands import HOLDERS, PROPS, by_an_object, by_fk, free
-from tests.animation.holds.oracle import Carrier, apart
+from tests.animation.holds.oracle import apart
 from tests.animation.holds.test_passing import MOMENTS, MOVING, juggled, off
+from tests.animation.keyed import Carrier
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import enabled, new_object
 from tests.animation.test_export import FORMATS, Format
