@@ -221,7 +221,7 @@ def _write_arrival_poses(binding: Binding, source: KeyedTransform, poses: Passin
     for (path, index), numbers in values.items():
         fcurve = bag.fcurves.find(path, index=index) or bag.fcurves.new(path, index=index)
         frames, there = poses.frames[: len(numbers)], key_points(fcurve)
-        desired = np.column_stack((frames, numbers))
+        desired = np.column_stack((frames, numbers)).astype(np.float32)
         if there.shape != desired.shape or not np.allclose(there, desired, rtol=0.0, atol=1e-7):
             replace_keys(fcurve, frames, numbers)
             changed = True
