@@ -16,6 +16,12 @@ from tests.animation.scenes import key, new_object
 FRAMES = np.arange(0.0, 62.0, 1.75)
 PICKED_UP, PASSED, LET_GO = 20.0, 36.0, 50.0
 PROPS = "Tool", "Child", "Rig/Bone"
+HANDS = "Hand", "Other", "Rig/Grip"
+
+RESTS = (
+    Rest("Grip", (0.3, 0.0, 1.4), (0.6, 0.1, 1.3)),
+    Rest("Bone", (-0.5, 0.3, 0.2), (-0.4, 0.3, 0.6), roll=0.9),
+)
 
 
 def found(name: str) -> Carrier:
@@ -27,20 +33,22 @@ def go_to(frame: float) -> None:
     bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
 
 
+def set_up(frames: Sequence[float], seed: int = 0) -> None:
+    """Add hands with keys on these frames, and props: an object, one with a moving parent, and a bone."""
+    new_rig("Rig", RESTS)
+    for name in ("Hand", "Other", "Parent", "Tool", "Child"):
+        new_object(name)
+    for number, name in enumerate((*HANDS, "Parent")):
+        key(found(name), frames, seed=seed + number)
+    found("Child").parent = found("Parent")
+
+
 @pytest.fixture
 def stage(live_file) -> Callable[[str], Carrier]:
     """Return a function that sets up a prop that is picked up, passed on and put down, by its name."""
 
     def set_stage(name: str = "Tool", *, held: bool = True) -> Carrier:
-        rests = (
-            Rest("Grip", (0.3, 0.0, 1.4), (0.6, 0.1, 1.3)),
-            Rest("Bone", (-0.5, 0.3, 0.2), (-0.4, 0.3, 0.6), roll=0.9),
-        )
-        rig = new_rig("Rig", rests)
-        for number, carrier in enumerate((*map(new_object, ("Hand", "Other", "Parent")), rig.pose.bones["Grip"])):
-            key(carrier, (1.0, 24.0, 41.0, 60.0), seed=number)
-        new_object("Tool"), new_object("Child")
-        found("Child").parent = found("Parent")
+        set_up((1.0, 24.0, 41.0, 60.0))
         prop = found(name)
         prop.rotation_mode = "QUATERNION"
         key(prop, (1.0, 9.0, 60.0), seed=7)
@@ -91,8 +99,8 @@ def copy(prop: Carrier, frame: float, by: float) -> None:
     """Duplicate keys as Shift D does."""
     for fcurve in moving(prop):
         there = next(point for point in fcurve.keyframe_points if abs(point.co.x - frame) < 0.01)
-        fields = {field: getattr(there, field) for field in ("co", "back", "amplitude", "period")}
+        fields = {field: getattr(there, field) for field in ("back", "amplitude", "period")}
         made = fcurve.keyframe_points.insert(there.co.x + by, there.co.y)
-        for field in ("back", "amplitude", "period"):
-            setattr(made, field, fields[field])
+        for field, value in fields.items():
+            setattr(made, field, value)
         fcurve.update()

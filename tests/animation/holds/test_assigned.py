@@ -8,7 +8,7 @@ import pytest
 from mathutils import Euler, Matrix, Quaternion
 
 from rigid_motion import animation
-from tests.animation.bones.rigs import in_turn
+from tests.animation.bones.rigs import in_turn, select_only
 from tests.animation.holds.model import assert_held
 from tests.animation.holds.staging import FRAMES, PROPS, found, go_to, stage, update
 from tests.animation.keyed import rotation_path
@@ -116,6 +116,20 @@ def test_undone_and_redone_it_is_where_it_was(stage, name, keyed):
     assert off(found(name), THERE) < 1e-5
 
 
+IN_HAND = (1.0, 0.5, 0.2)
+"""The place of a hand."""
+
+
+def in_a_hand(place: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> bpy.types.Object:
+    """Return a prop that is held in a hand, at this place in the world."""
+    hand, prop = new_object("Hand"), new_object("Tool", "QUATERNION")
+    hand.location, prop.location = IN_HAND, place
+    update()
+    animation.hold_in(prop, hand)
+    update()
+    return prop
+
+
 def identities(prop: bpy.types.Object) -> None:
     prop.matrix_basis = Matrix()
 
@@ -128,11 +142,7 @@ def seen_as_channels(prop: bpy.types.Object) -> None:
 @pytest.mark.parametrize("stand", ["anywhere", "in the origin of the world", "in the origin of the hand"])
 def test_channels_that_are_set_are_taken_as_they_are(live_file, edit, stand):
     """Even if they happen to equal the displayed matrix, as Alt G makes them for an object at the world origin."""
-    hand, prop = new_object("Hand"), new_object("Tool", "QUATERNION")
-    hand.location = (1.0, 0.5, 0.2)
-    update()
-    animation.hold_in(prop, hand)
-    update()
+    prop = in_a_hand()
     prop.animation_data.action = None
     if stand == "in the origin of the hand":
         prop.matrix_basis = Matrix()
@@ -144,28 +154,22 @@ def test_channels_that_are_set_are_taken_as_they_are(live_file, edit, stand):
     basis = bpy.data.objects["Tool"].matrix_basis.copy()
     bpy.ops.ed.undo_push(message="Edit")
     update()
-    assert off(bpy.data.objects["Tool"], Matrix.Translation((1.0, 0.5, 0.2)) @ basis) < 1e-5
+    assert off(bpy.data.objects["Tool"], Matrix.Translation(IN_HAND) @ basis) < 1e-5
     bpy.ops.ed.undo()
     bpy.ops.ed.redo()
     for _ in range(2):
         update()
         assert np.abs(np.array(bpy.data.objects["Tool"].matrix_basis) - np.array(basis)).max() < 1e-6
-        assert off(bpy.data.objects["Tool"], Matrix.Translation((1.0, 0.5, 0.2)) @ basis) < 1e-5
+        assert off(bpy.data.objects["Tool"], Matrix.Translation(IN_HAND) @ basis) < 1e-5
 
 
 def test_a_file_that_is_opened_is_as_it_was_saved(live_file, tmp_path):
     """Its matrices are not evaluated yet, and an object held at the origin of a hand has the same channels."""
-    hand, prop = new_object("Hand"), new_object("Tool", "QUATERNION")
-    hand.location = (1.0, 0.5, 0.2)
-    update()
-    prop.location = (1.0, 0.5, 0.2)
-    update()
-    animation.hold_in(prop, hand)
-    update()
+    in_a_hand(IN_HAND)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "held.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "held.blend"))
     update()
-    assert off(bpy.data.objects["Tool"], Matrix.Translation((1.0, 0.5, 0.2))) < 1e-5
+    assert off(bpy.data.objects["Tool"], Matrix.Translation(IN_HAND)) < 1e-5
 
 
 @pytest.mark.parametrize("cleared", [False, True])
@@ -178,11 +182,8 @@ def test_it_stays_where_its_parent_is_changed_and_its_transform_is_kept(stage, k
     update()
     go_to(25.0)
     before = world_of(prop)
-    for obj in bpy.context.view_layer.objects:
-        obj.select_set(obj in (prop, parent))
-    bpy.context.view_layer.objects.active = parent
+    select_only(*((prop,) if cleared else (parent, prop)))
     if cleared:
-        parent.select_set(False)
         bpy.ops.object.parent_clear(type="CLEAR_KEEP_TRANSFORM")
     else:
         bpy.ops.object.parent_set(type="OBJECT", keep_transform=True)

@@ -11,15 +11,14 @@ from hypothesis import strategies as st
 from hypothesis.stateful import initialize, precondition, rule
 
 from rigid_motion import animation
-from tests.animation.bones.rigs import Rest, new_rig, select_only
+from tests.animation.bones.rigs import select_only
 from tests.animation.editing import ORDERS
 from tests.animation.holds.hold_steps import WithHolds
+from tests.animation.holds.staging import HANDS, PROPS, found, set_up
 from tests.animation.keyed import MODE_IDS, Carrier, curves_of, key_frames
 from tests.animation.machine import LAST, SETTINGS, seeds, shares, while_on
 from tests.animation.oracle import world_of
-from tests.animation.scenes import key, new_object, push_down, tweak
-
-HANDS = "Hand", "Other", "Rig/Grip"
+from tests.animation.scenes import FRAMES, key, push_down, tweak
 
 
 class Holding(WithHolds):
@@ -33,19 +32,13 @@ class Holding(WithHolds):
     )
     def begin(self, orders, mode, seed, held=()):
         bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, LAST
-        rests = (
-            Rest("Grip", (0.3, 0.0, 1.4), (0.6, 0.1, 1.3)),
-            Rest("Bone", (-0.5, 0.3, 0.2), (-0.4, 0.3, 0.6), roll=0.9),
-        )
-        rig = new_rig("Rig", rests)
-        carriers = [key(new_object(name), seed=seed + n) for n, name in enumerate(("Hand", "Other", "Parent"))]
-        carriers += [key(rig.pose.bones["Grip"], seed=seed)]
-        for obj, order in zip((new_object("Tool"), new_object("Child"), rig.pose.bones["Bone"]), orders, strict=True):
-            obj.rotation_mode = order
-            key(obj, (1.0, 13.0, 26.0, 37.0), seed=seed + 5)
-            animation.set_mode(obj, mode)
-        bpy.data.objects["Child"].parent = bpy.data.objects["Parent"]
-        self.names = ["Tool", "Child", "Rig/Bone"]
+        set_up(FRAMES, seed)
+        for name, order in zip(PROPS, orders, strict=True):
+            prop = found(name)
+            prop.rotation_mode = order
+            key(prop, (1.0, 13.0, 26.0, 37.0), seed=seed + 5)
+            animation.set_mode(prop, mode)
+        self.names = [*PROPS]
         bpy.context.scene.frame_set(20)
         for name, by in zip(self.names, held, strict=False):
             if by is not None:
@@ -53,9 +46,7 @@ class Holding(WithHolds):
         bpy.context.scene.frame_set(1)
         self._start_history()
 
-    def _found(self, name: str) -> Carrier:
-        obj, _, bone = name.partition("/")
-        return bpy.data.objects[obj].pose.bones[bone] if bone else bpy.data.objects[obj]
+    _found = staticmethod(found)
 
     def _basis(self, carrier: Carrier) -> np.ndarray:
         return world_of(carrier)
