@@ -107,6 +107,20 @@ def test_keys_take_their_space_along(stage, name, edit):
         assert np.abs(after - before).max() < (1e-5 if "influence" in edit or "hold" in edit else np.inf)
 
 
+@pytest.mark.parametrize(("frame", "name"), in_turn((1.0, 20.4, 34.0), PROPS))
+def test_it_stays_where_it_is_seen_in_whatever_it_is_held(stage, name, frame):
+    stage(name)
+    for holder in ("Other", "Hand", None):
+        go_to(frame)
+        before = world_of(found(name))
+        animation.hold_in(found(name), holder and found(holder))
+        go_to(frame)
+        assert np.abs(world_of(found(name)) - before).max() < 1e-5
+        now = animation.hold_facts(found(name)).now
+        assert (now and now.name) == holder
+        assert_held([found(name)], FRAMES)
+
+
 def test_what_moves_does_so_until_it_is_held(stage):
     prop = stage(held=False)
     go_to(PICKED_UP)
