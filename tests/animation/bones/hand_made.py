@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from tests.animation.bones.rigs import Rest, new_rig
-from tests.animation.keyed import curves_of, rotation_path
+from tests.animation.keyed import curves_of, key_frames, rotation_path
 from tests.animation.scenes import write
 
 LAST = 120
@@ -81,10 +81,7 @@ def _give_handles(fcurve: bpy.types.FCurve, handles: str) -> None:
 
 def keys_of(rig: bpy.types.Object) -> dict[str, np.ndarray]:
     """Return the key frames of each bone."""
-    return {
-        bone.name: np.unique([key.co.x for fcurve in curves_of(bone).values() for key in fcurve.keyframe_points])
-        for bone in rig.pose.bones
-    }
+    return {bone.name: key_frames(bone) for bone in rig.pose.bones}
 
 
 def bake_each_frame(rig: bpy.types.Object) -> None:

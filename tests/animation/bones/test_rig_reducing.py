@@ -10,14 +10,10 @@ import itertools
 import bpy
 import numpy as np
 import pytest
-from mathutils import Quaternion
 
 from rigid_motion.animation import (
     NATIVE,
     Refused,
-    bake,
-    hold_facts,
-    hold_in,
     is_reduced,
     key_frames,
     modes_of,
@@ -30,8 +26,6 @@ from rigid_motion.animation.baking import search
 from rigid_motion.animation.baking.motions import not_promised
 from tests.animation.bones.poses import shown_poses
 from tests.animation.bones.rigs import Rest, in_turn, new_rig
-from tests.animation.held import in_holder, put
-from tests.animation.keyed import curves_of
 from tests.animation.oracle import shown_worlds
 from tests.balls import largest_displacements
 from tests.rigs.recorded import FRAMES, NAMES, recorded_rig
@@ -193,37 +187,3 @@ def test_what_follows_a_driver_is_named_unless_that_is_muted(live_file, mute, na
     rig = recorded_rig(still=("Head",))
     rig.pose.bones["Head"].driver_add("rotation_quaternion", 1).mute = mute
     assert not_promised(rig) == named
-
-
-def test_a_bone_of_a_rig_that_another_one_holds_is_reduced_in_its_hand_along_with_the_rest(live_file):
-    rig = recorded_rig()
-    head, hand = bones(rig, "Head", "Hand.R")
-    for fcurve in curves_of(head).values():
-        while fcurve.keyframe_points[-1].co.x > 40.0:
-            fcurve.keyframe_points.remove(fcurve.keyframe_points[-1])
-    bpy.context.scene.frame_set(40)
-    hold_in(head, hand)
-    turned = head.rotation_quaternion.copy()
-    for frame, angle in ((65.0, 0.5), (90.0, 1.0)):
-        put(head, frame, head.location, turned @ Quaternion((0.0, 0.6, 0.8), angle))
-    bpy.context.view_layer.update()
-    bake(head)
-    held = FRAMES[FRAMES >= 40.0]
-    truth, local = matrices(rig), in_holder(head, hand, held)
-    reduction = reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
-    assert reduction.after < 0.6 * reduction.before
-    assert "Head" in reduction.rig.not_promised
-    off = errors(rig, truth)
-    del off["Head"]
-    assert max(off.values()) <= TOLERANCE * (1.0 + 1e-4)
-    assert 40.0 in key_frames(head)
-    assert len(key_frames(head)) < len(FRAMES)
-    facts = []
-    for frame in (39, 40):
-        bpy.context.scene.frame_set(frame)
-        facts.append(hold_facts(head).now)
-    assert (facts[0], facts[1].name) == (None, "Hand.R")
-    # Relative to the hand, wherever the hand is now, it is within the tolerance.
-    assert largest(in_holder(head, hand, held), local).max() <= TOLERANCE * (1.0 + 1e-4)
-    restore_keys(bones(rig))
-    assert len(key_frames(head)) == len(FRAMES)

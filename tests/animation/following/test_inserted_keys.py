@@ -1,8 +1,11 @@
-"""Keys inserted between keys when the displayed pose differs from the original motion."""
+"""Inserted keys leave the motion unchanged between keys, in every mode and with any handles, and keep the pose seen
+where that differs from the motion. Unkeyed poses stay while another channel is keyed, and vanish on the next frame.
+"""
 
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 
 import bpy
 import numpy as np
@@ -13,11 +16,150 @@ from rigid_motion.animation import key_frames, repeat, set_mode, write_channel
 from rigid_motion.animation.evaluation import source_cache
 from rigid_motion.animation.queries.keyed import source_of
 from tests.animation.bones.rigs import in_turn, select_only
-from tests.animation.keyed import curves_of, rotation_path, transform_paths
-from tests.animation.oracle import shown_worlds, world_now
+from tests.animation.keyed import MODE_IDS, WIDTHS, curve_of, curves_of, rotation_path, transform_paths
+from tests.animation.oracle import assert_shown, shown_worlds, world_now
 from tests.animation.scenes import key, new_object, push_down, random_values, tweak
 
 ORDERS = ("QUATERNION", "XYZ", "ZXY", "AXIS_ANGLE")
+FRAMES = (1.0, 17.0, 25.0, 49.0, 60.0)
+POSES = [
+    ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),
+    ((1.0, 0.4, -0.3), (0.9, 0.1, -0.2, 0.37)),
+    ((1.9, 1.5, 0.1), (0.6, 0.3, -0.3, 0.67)),
+    ((3.5, 1.9, 0.2), (0.2, 0.5, -0.3, 0.78)),
+    ((3.0, 1.0, 1.2), (0.1, 0.2, -0.5, 0.78)),
+]
+POINTS = np.array(((0.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0))).T
+"""The origin, and three points 1 m away."""
+
+MILLIMETRE = 1e-3
+PLAYED = np.arange(1.0, 60.25, 0.25)
+
+
+def keyed(carrier, frames=FRAMES, poses=POSES):
+    """Key the carrier as I does, with Blender's default handles."""
+    for frame, (location, quaternion) in zip(frames, poses, strict=False):
+        carrier.location, carrier.rotation_quaternion = location, quaternion / np.linalg.norm(quaternion)
+        insert(carrier, frame)
+    return carrier
+
+
+def insert(carrier, frame: float | None = None) -> None:
+    """Key all of its transform, at this frame or at that of the scene."""
+    for path in transform_paths(carrier):
+        carrier.keyframe_insert(path, **({} if frame is None else {"frame": frame}))
+
+
+def transform_curves(carrier) -> list[bpy.types.FCurve]:
+    return [fcurve for (path, _), fcurve in curves_of(carrier).items() if path in WIDTHS]
+
+
+def keys_of(carrier) -> list[bpy.types.Keyframe]:
+    return [point for fcurve in transform_curves(carrier) for point in fcurve.keyframe_points]
+
+
+def pulled(*, apart: bool) -> Callable:
+    """Return an edit that sets handles by hand, on frames that the channels share or on frames of their own."""
+
+    def pull(carrier) -> None:
+        random = np.random.default_rng(4)
+        shares = random.uniform(0.1, 0.6, size=(len(FRAMES), 2))
+        for fcurve in transform_curves(carrier):
+            points = fcurve.keyframe_points
+            for number, point in enumerate(points):
+                left, right = random.uniform(0.1, 0.6, size=2) if apart else shares[number]
+                before = point.co[0] - points[max(number - 1, 0)].co[0]
+                behind = points[min(number + 1, len(points) - 1)].co[0] - point.co[0]
+                slope = 0.02 * random.normal()
+                point.handle_left_type = point.handle_right_type = "FREE"
+                point.handle_left = point.co[0] - left * before, point.co[1] - slope * before
+                point.handle_right = point.co[0] + right * behind, point.co[1] + slope * behind
+            fcurve.update()
+
+    return pull
+
+
+def partly_linear(carrier) -> None:
+    for point in curves_of(carrier)["location", 0].keyframe_points:
+        point.interpolation = "LINEAR"
+
+
+HANDLES = {
+    "as I sets them": lambda carrier: None,
+    "FREE": pulled(apart=False),
+    "FREE, each channel otherwise": pulled(apart=True),
+    "one channel linear": partly_linear,
+}
+
+
+def shown(obj: bpy.types.Object) -> np.ndarray:
+    """Return the displayed points, shape (m, 3, 4)."""
+    return (shown_worlds([obj], PLAYED)[0] @ POINTS)[:, :3]
+
+
+def largest(now: np.ndarray, then: np.ndarray) -> float:
+    return float(np.linalg.norm(now - then, axis=1).max())
+
+
+def key_on(carrier, frame: int) -> None:
+    bpy.context.scene.frame_set(frame)
+    bpy.context.view_layer.update()
+    insert(carrier)
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize(("mode", "handles"), in_turn(MODE_IDS, [*HANDLES]))
+def test_a_key_in_between_leaves_the_motion_as_it_was(live_file, mode, handles):
+    """It is a breakdown where a regular key would change the path. Blender's own segments may change as in Blender."""
+    obj = keyed(new_object())
+    HANDLES[handles](obj)
+    set_mode(obj, mode)
+    seen = shown(obj)
+    for frame in (31, 34, 9):
+        key_on(obj, frame)
+        assert mode == "BLENDER" or largest(shown(obj), seen) < MILLIMETRE, f"key on {frame}"
+    depends = mode in ("pga_lerp", "cga_lerp", "motor_spline")
+    types = {point.co[0]: point.type for point in keys_of(obj)}
+    assert {types[frame] for frame in (31.0, 34.0, 9.0)} == {"BREAKDOWN" if depends else "KEYFRAME"}
+    assert {types[frame] for frame in FRAMES} == {"KEYFRAME"}
+
+
+def test_a_breakdown_that_is_moved_is_hit_and_takes_along_what_is_beside_it_alone(live_file):
+    """A key beside it then changes the motion only up to the surrounding keys."""
+    obj = keyed(new_object())
+    set_mode(obj, "motor_spline")
+    key_on(obj, 31)
+    before = shown(obj)
+    fcurve = curves_of(obj)["location", 2]
+    next(point for point in fcurve.keyframe_points if point.co[0] == 31.0).co_ui.y += 0.4
+    fcurve.update()
+    bpy.context.view_layer.update()
+    after = shown(obj)
+    way = np.linalg.norm(after - before, axis=1).max(axis=1)
+    assert way[PLAYED == 31.0] == pytest.approx(0.4, abs=1e-5)
+    assert way[(PLAYED <= 25.0) | (PLAYED >= 49.0)].max() < 1e-5
+    assert np.all(way[(PLAYED > 25.0) & (PLAYED < 31.0)] > 0.0)
+    assert way.max() < 0.41
+    bends = np.linalg.norm(np.diff(after[(PLAYED > 25.0) & (PLAYED < 48.0), :, 0], n=2, axis=0), axis=1)
+    assert bends.max() < 0.01, "and nowhere suddenly"
+    key_on(obj, 40)
+    way = np.linalg.norm(shown(obj) - after, axis=1).max(axis=1)
+    assert way[(PLAYED <= 31.0) | (PLAYED == 40.0) | (PLAYED >= 49.0)].max() < 1e-5
+    assert way.max() < 0.4 / 6.0
+
+
+@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
+@pytest.mark.parametrize("interpolation", ["BEZIER", "LINEAR"])
+def test_it_rests_where_a_pose_was_computed_twice(live_file, mode, interpolation):
+    """The poses differ by rounding in single precision, which handles that overshoot their keys must not amplify."""
+    place, angles = POSES[1]
+    twice = (np.nextafter(np.float32(place), np.float32(9.0)), angles)
+    obj = keyed(new_object(), (1.0, 25.0, 49.0, 73.0), [POSES[0], POSES[1], twice, POSES[2]])
+    for point in keys_of(obj):
+        point.interpolation, point.handle_left_type, point.handle_right_type = interpolation, "AUTO", "AUTO"
+    set_mode(obj, mode)
+    (resting,) = shown_worlds([obj], np.arange(25.0, 50.0))
+    assert np.abs(resting - resting[0]).max() < 2e-6
 
 
 def moving(order: str = "QUATERNION") -> bpy.types.Object:
@@ -26,12 +168,6 @@ def moving(order: str = "QUATERNION") -> bpy.types.Object:
     set_mode(obj, "dq_sclerp")
     bpy.context.scene.frame_set(15)
     return obj
-
-
-def insert(obj: bpy.types.Object) -> None:
-    """Key all transform channels at their current values."""
-    for path in transform_paths(obj):
-        obj.keyframe_insert(path)
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -111,3 +247,63 @@ def test_a_key_outside_of_the_keys_keeps_the_pose_where_the_motion_goes_on(live_
     before = world_now()
     insert(obj)
     assert np.abs(world_now() - before).max() < 2e-5 * max(1.0, np.abs(before).max())
+
+
+def posed(order: str) -> bpy.types.Object:
+    """Return an object that was moved, turned, scaled and given another property between two keys."""
+    obj = key(new_object("Tool", order), scale="even")
+    obj["speed"] = 1.0
+    obj.keyframe_insert('["speed"]', frame=1)
+    set_mode(obj, "dq_sclerp")
+    bpy.context.scene.frame_set(15)
+    for path in ("location", rotation_path(obj), "scale"):
+        setattr(obj, path, random_values(obj, path, 1, 7)[0])
+    obj["speed"] = 5.0
+    bpy.context.view_layer.update()
+    return obj
+
+
+@pytest.mark.parametrize(("keyed", "order"), in_turn([(0, -1), (1, -1), (2, -1), (0, 1)], ORDERS))
+def test_what_is_not_keyed_stays_until_the_next_frame(live_file, keyed, order):
+    part, index = keyed
+    obj = posed(order)
+    paths = ["location", rotation_path(obj), "scale"]
+    pose, seen = {path: np.array(getattr(obj, path)) for path in paths}, world_now()
+    obj.keyframe_insert(paths[part], index=index)
+    assert np.abs(world_now() - seen).max() < 1e-6
+    assert all(np.array_equal(getattr(obj, path), pose[path]) for path in paths)
+    assert obj["speed"] == 5.0
+    live_file.scene.frame_set(16)
+    live_file.scene.frame_set(15)
+    for path in paths:
+        error = np.abs(np.subtract(getattr(obj, path), pose[path]))
+        is_keyed = np.isin(np.arange(len(error)), index if index >= 0 else range(4)) & (path == paths[part])
+        # Channels keyed along with it have keys there, too, with the values of the motion.
+        assert error[is_keyed].max(initial=0.0) < 1e-5
+        assert is_keyed.all() or error[~is_keyed].max() > 0.01
+    assert {len(curve_of(obj, paths[part], each).keyframe_points) for each in range(3)} == {5}
+    assert obj["speed"] == 1.0
+    assert_shown([obj], np.arange(1.0, 41.0, 1.375))
+
+
+def test_what_is_edited_goes_where_it_has_it_and_poses_of_other_users_of_the_action_stay(live_file):
+    obj = posed("QUATERNION")
+    other = new_object("Other")
+    other.animation_data_create().action = obj.animation_data.action
+    other.animation_data.action_slot = obj.animation_data.action_slot
+    bpy.context.view_layer.update()
+    for one, size in ((obj, 2.0), (other, 3.0)):
+        one.scale = (size, size, size)
+    bpy.context.view_layer.update()
+    for index in range(3):
+        fcurve = curve_of(obj, "location", index)
+        fcurve.keyframe_points[1].co_ui.y += 2.0
+        fcurve.update()
+    bpy.context.view_layer.update()
+    assert list(obj.location) == pytest.approx(
+        [curve_of(obj, "location", index).evaluate(15.0) for index in range(3)], abs=1e-5
+    )
+    obj.keyframe_insert("location")
+    bpy.context.view_layer.update()
+    assert tuple(obj.scale) == (2.0, 2.0, 2.0)
+    assert tuple(other.scale) == (3.0, 3.0, 3.0)
