@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from mathutils import Euler, Matrix
+from mathutils import Matrix
 
 from rigid_motion import animation
 from rigid_motion.animation.actions.reading import read
 from rigid_motion.animation.evaluation.components import PART_OF
 from rigid_motion.animation.evaluation.differences import seen_values
 from rigid_motion.animation.evaluation.sources import HoldRun, KeyedTransform
-from rigid_motion.animation.holds.placing import unevenness_of
+from rigid_motion.animation.holds.placing import matrices_of, unevenness_of
 from rigid_motion.animation.queries.keyed import active_binding
 from rigid_motion.animation.transforms import transform_of
-from tests.animation.keyed import Carrier, rotation_path
-from tests.animation.oracle import matrices, shown_worlds
+from tests.animation.holds.oracle import mixed
+from tests.animation.keyed import Carrier
+from tests.animation.oracle import shown_worlds
 
 OVER = 1e-3
 """Tolerance while an object passes to a moving holder: `test_passing` tests the precision of passes."""
@@ -75,13 +76,15 @@ def expected_worlds(prop: Carrier, frames: np.ndarray, tolerance: float = 1e-5) 
         over = (frames > switch.begin) & (frames < switch.frame)
         if over.any():
             share = np.minimum((frames[over] - switch.begin) / (switch.there - switch.begin), 1.0)
-            both = zip(carried(place, over), carried(place + 1, over), share, strict=True)
-            mixed = [_mixed_matrices(Matrix(one), Matrix(other), s * s * (3.0 - 2.0 * s)) for one, other, s in both]
-            result[over] = [matrix for matrix, _ in mixed]
+            both = carried(place, over), carried(place + 1, over)
+            shares = share * share * (3.0 - 2.0 * share)
+            result[over] = [mixed(*each) for each in zip(*both, shares, strict=True)]
+            turns = ([Matrix(each).to_quaternion() for each in matrices] for matrices in both)
+            is_sure = np.abs([one.dot(other) for one, other in zip(*turns, strict=True)]) > HALF_A_TURN
             # Channels have no shear. A prop that passes to a holder of uneven scale is sheared until it arrives.
             holder = holders.get(numbers[place + 1])
             is_even = holder is None or unevenness_of(holder.offset) < 1e-5
-            tolerances[over] = [OVER if is_sure and is_even else np.inf for _, is_sure in mixed]
+            tolerances[over] = np.where(is_sure & is_even, OVER, np.inf)
     return result, tolerances
 
 
@@ -100,14 +103,7 @@ def _poses(prop: Carrier, run: HoldRun | KeyedTransform, frames: np.ndarray) -> 
     for row, one in enumerate(transform.components().tolist()):
         if PART_OF[row] not in source.keyed:
             rows[row] = one
-    if prop.rotation_mode == "QUATERNION":
-        turned = rows[3:7].T
-    elif prop.rotation_mode == "AXIS_ANGLE":
-        turned = np.array([Matrix.Rotation(a, 4, (x, y, z)).to_quaternion() for a, x, y, z in rows[3:7].T])
-    else:
-        assert rotation_path(prop) == "rotation_euler"
-        turned = np.array([Euler(angles, prop.rotation_mode).to_quaternion() for angles in rows[3:6].T])
-    return matrices(rows[:3].T, turned, rows[7:].T)
+    return np.array(matrices_of(rows, transform.order))
 
 
 def _spaces(prop: Carrier, frames: np.ndarray) -> np.ndarray:
@@ -120,12 +116,3 @@ def _spaces(prop: Carrier, frames: np.ndarray) -> np.ndarray:
     if prop.parent is None:
         return np.tile(np.eye(4), (len(frames), 1, 1))
     return shown_worlds([prop.parent], frames)[0] @ np.array(prop.matrix_parent_inverse)
-
-
-def _mixed_matrices(one: Matrix, other: Matrix, share: float) -> tuple[np.ndarray, bool]:
-    (place, q, size), (there, r, other_size) = one.decompose(), other.decompose()
-    alike = q.dot(r)
-    turned = q.slerp(r if alike > 0.0 else -r, share)
-    return np.array(Matrix.LocRotScale(place.lerp(there, share), turned, size.lerp(other_size, share))), abs(
-        alike
-    ) > HALF_A_TURN

@@ -1,6 +1,6 @@
-"""Oracle for held props, in NumPy alone: their world matrices from Blender's displayed holders and raw keys.
+"""Oracle for held props: their world matrices from Blender's displayed holders and raw keys.
 
-It uses no code of the program. Matrices are (m, 4, 4), in double precision; frames are the scene's, not seconds.
+It uses no code of the program. Matrices are (m, 4, 4); frames are the scene's, not seconds.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from mathutils import Matrix
 
 from tests.animation.keyed import Carrier
 from tests.animation.oracle import shown_worlds
@@ -38,37 +39,13 @@ def apart(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.linalg.norm(((rigid(one) - rigid(other)) @ POINTS.T)[:, :3], axis=1).max(initial=0.0))
 
 
-def quaternions(matrices: np.ndarray) -> np.ndarray:
-    """Return unit quaternions (m, 4), w first, of rotations: by an eigenvector, which needs no special cases."""
-    r = np.moveaxis(rigid(matrices)[:, :3, :3], 0, -1)
-    k = np.empty((len(matrices), 4, 4))
-    k[:, 0, 0] = np.trace(r)
-    for i in range(3):
-        a, b = (i + 1) % 3, (i + 2) % 3
-        k[:, 0, i + 1] = k[:, i + 1, 0] = r[b, a] - r[a, b]
-        for j in range(3):
-            k[:, i + 1, j + 1] = r[i, j] + r[j, i] - (i == j) * np.trace(r)
-    return np.linalg.eigh(k)[1][:, :, -1]
-
-
-def lerp_slerp(one: np.ndarray, other: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Interpolate locations linearly, and rotations the shortest way at constant speed, at these fractions (m,)."""
-    p, q = quaternions(one), quaternions(other)
-    q = np.where(np.einsum("mi,mi->m", p, q)[:, None] < 0.0, -q, q)
-    half = 2.0 * np.arctan2(np.linalg.norm(p - q, axis=1), np.linalg.norm(p + q, axis=1))
-    sine = np.where(half > 1e-9, np.sin(half), 1.0)
-    weights = (np.where(half > 1e-9, np.sin(s * half) / sine, s) for s in (1.0 - share, share))
-    w, x, y, z = sum(weight[:, None] * turn for weight, turn in zip(weights, (p, q), strict=True)).T
-    result = np.zeros((len(share), 4, 4))
-    result[:, 3, 3] = 1.0
-    result[:, :3, 3] = one[:, :3, 3] + share[:, None] * (other[:, :3, 3] - one[:, :3, 3])
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+def mixed(one: np.ndarray, other: np.ndarray, share: float) -> np.ndarray:
+    """Interpolate locations and scales linearly, and rotations the shortest way at constant speed."""
+    (place, turn, size), (there, next_turn, next_size) = Matrix(one).decompose(), Matrix(other).decompose()
+    next_turn.make_compatible(turn)
+    return np.array(
+        Matrix.LocRotScale(place.lerp(there, share), turn.slerp(next_turn, share), size.lerp(next_size, share))
     )
-    result[:, :3, :3] = np.moveaxis(np.array(rows), -1, 0)
-    return result
 
 
 Motion = Callable[[np.ndarray], np.ndarray]
@@ -103,5 +80,5 @@ def carried(
             # It arrives shortly before its key.
             u = np.minimum((frames[on] - begin) / (hold.frame - soon - begin), 1.0)
             both = [spaces[i][on] @ motions[i](frames[on]) for i in (place, place + 1)]
-            result[on] = lerp_slerp(*both, u * u * (3.0 - 2.0 * u))
+            result[on] = [mixed(*each) for each in zip(*both, u * u * (3.0 - 2.0 * u), strict=True)]
     return result
