@@ -62,18 +62,17 @@ def pulled(*, apart: bool) -> Callable:
     """Return an edit that sets handles by hand, on frames that the channels share or on frames of their own."""
 
     def pull(carrier) -> None:
-        random = np.random.default_rng(4)
-        shares = random.uniform(0.1, 0.6, size=(len(FRAMES), 2))
-        for fcurve in transform_curves(carrier):
-            points = fcurve.keyframe_points
-            for number, point in enumerate(points):
-                left, right = random.uniform(0.1, 0.6, size=2) if apart else shares[number]
-                before = point.co[0] - points[max(number - 1, 0)].co[0]
-                behind = points[min(number + 1, len(points) - 1)].co[0] - point.co[0]
-                slope = 0.02 * random.normal()
+        for number, fcurve in enumerate(transform_curves(carrier)):
+            shares = np.random.default_rng(number if apart else 4).uniform(0.1, 0.6, size=(len(FRAMES), 2))
+            slopes = 0.02 * np.random.default_rng(number).normal(size=len(FRAMES))
+            # At the first and the last key, handles point outside.
+            before, behind = np.diff(FRAMES, prepend=-5.0), np.diff(FRAMES, append=70.0)
+            for point, share, slope, left, right in zip(
+                fcurve.keyframe_points, shares, slopes, before, behind, strict=True
+            ):
                 point.handle_left_type = point.handle_right_type = "FREE"
-                point.handle_left = point.co[0] - left * before, point.co[1] - slope * before
-                point.handle_right = point.co[0] + right * behind, point.co[1] + slope * behind
+                point.handle_left = point.co[0] - share[0] * left, point.co[1] - slope * left
+                point.handle_right = point.co[0] + share[1] * right, point.co[1] + slope * right
             fcurve.update()
 
     return pull

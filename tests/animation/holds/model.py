@@ -26,11 +26,11 @@ HALF_A_TURN = 0.02
 """Between quaternions with a smaller absolute dot product, the rotation may go either way."""
 
 
-def assert_held(props: Iterable[Carrier], frames: Sequence[float], tolerance: float = 1e-5) -> None:
-    """Check that props are displayed where their keys say, relative to the largest value, to `OVER` while passing."""
+def assert_held(props: Iterable[Carrier], frames: Sequence[float]) -> None:
+    """Check that props are displayed where their keys say, to 1e-5 of the largest value, to `OVER` while passing."""
     frames = np.asarray(frames, float)
     for prop in props:
-        expected, tolerances = expected_worlds(prop, frames, tolerance)
+        expected, tolerances = expected_worlds(prop, frames)
         error = np.abs(shown_worlds([prop], frames)[0] - expected).max(axis=(1, 2)) / max(1.0, np.abs(expected).max())
         worst = int((error / tolerances).argmax())
         assert error[worst] < tolerances[worst], f"{prop!r} is off by {error[worst]:.3g} on frame {frames[worst]}"
@@ -47,7 +47,7 @@ def poses_in_holders(prop: Carrier, frames: Sequence[float]) -> np.ndarray:
     return result
 
 
-def expected_worlds(prop: Carrier, frames: np.ndarray, tolerance: float = 1e-5) -> tuple[np.ndarray, np.ndarray]:
+def expected_worlds(prop: Carrier, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return a prop's expected matrices on frames, (m, 4, 4), and the tolerances as fractions of its size."""
     transform = transform_of(prop)
     source = read(active_binding(transform))
@@ -68,7 +68,7 @@ def expected_worlds(prop: Carrier, frames: np.ndarray, tolerance: float = 1e-5) 
             )
         return spaces[number][chosen] @ _poses(prop, run, frames[chosen])
 
-    result, tolerances = np.empty((len(frames), 4, 4)), np.full(len(frames), tolerance)
+    result, tolerances = np.empty((len(frames), 4, 4)), np.full(len(frames), 1e-5)
     at = np.searchsorted([run.stretch.until for run in source.runs], frames, side="right")
     for place in np.unique(at).tolist():
         result[at == place] = carried(place, at == place)

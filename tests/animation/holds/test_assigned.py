@@ -39,10 +39,9 @@ def test_it_is_where_it_is_assigned_to_be_whatever_holds_it(stage, name, frame, 
     update()
     go_to(frame)
     prop.matrix_world = THERE
-    update()
-    assert off(prop, THERE) < 1e-5
-    update()
-    assert off(prop, THERE) < 1e-5
+    for _ in range(2):
+        update()
+        assert off(prop, THERE) < 1e-5
     key_all(prop, frame)
     go_to(frame)
     assert off(prop, THERE) < 1e-5
@@ -102,18 +101,13 @@ def test_undone_and_redone_it_is_where_it_was(stage, name, keyed):
     new_object("Another")
     bpy.ops.ed.undo_push(message="Another")
     update()
-    bpy.ops.ed.undo()
-    update()
-    assert off(found(name), THERE) < 1e-5
-    if keyed:
-        go_to(25.0)
-        assert off(found(name), THERE) < 1e-5
-    bpy.ops.ed.undo()
-    update()
-    assert off(found(name), Matrix(before)) < 1e-5
-    bpy.ops.ed.redo()
-    update()
-    assert off(found(name), THERE) < 1e-5
+    for step, world in ((bpy.ops.ed.undo, THERE), (bpy.ops.ed.undo, before), (bpy.ops.ed.redo, THERE)):
+        step()
+        update()
+        assert off(found(name), world) < 1e-5
+        if keyed:
+            go_to(25.0)
+            assert off(found(name), world) < 1e-5
 
 
 IN_HAND = (1.0, 0.5, 0.2)

@@ -7,11 +7,10 @@ from collections.abc import Iterator
 import bpy
 import numpy as np
 import pytest
-from mathutils import Quaternion
 
 from rigid_motion import animation
 from tests.animation.farm import played_on_a_farm
-from tests.animation.holds.hands import HOLDERS, PROPS, by_an_object, by_fk, free, place, take
+from tests.animation.holds.hands import HOLDERS, PROPS, by_an_object, by_fk, free, place, take, wander
 from tests.animation.holds.oracle import apart
 from tests.animation.holds.test_passing import MOMENTS, MOVING, juggled, off
 from tests.animation.keyed import Carrier
@@ -32,10 +31,7 @@ def move_by_hand(hand: Carrier) -> None:
     """Edit a hand as animators do: other keys, another place of the arm, and a constraint."""
     rig = hand.id_data
     rig.location, rig.rotation_euler = (0.3, -0.2, 0.1), (0.2, 0.5, -0.3)
-    for frame, turn in ((20, (0.8, 0.1, -0.3, 0.2)), (52, (0.7, -0.4, 0.1, 0.3))):
-        hand.rotation_mode = "QUATERNION"
-        hand.rotation_quaternion = Quaternion(turn).normalized()
-        hand.keyframe_insert("rotation_quaternion", frame=frame)
+    wander(hand, 71, 0.0)
     goal = new_object("Goal")
     goal.location = 0.4, 0.4, 1.6
     track = hand.constraints.new("DAMPED_TRACK")
