@@ -8,14 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import (
-    FEWEST,
-    NATIVE,
-    bake_poses,
-    reduce_keys_of,
-    reduction_of,
-    restore_keys,
-)
+from rigid_motion.animation import FEWEST, NATIVE, bake_poses, reduce_keys_of, reduction_of, restore_keys
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.bones.hand_made import AUTOMATIC, LAST, OF_OLD, THIRD, bake_each_frame, hand_made, keys_of
 from tests.animation.bones.poses import shown_of

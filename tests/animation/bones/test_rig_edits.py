@@ -11,11 +11,7 @@ from mathutils import Euler
 
 from rigid_motion.animation import problem_of, refresh, set_mode, set_turns
 from tests.animation.bones.poses import assert_posed, placed
-from tests.animation.bones.rigs import (
-    BETWEEN,
-    moving_rig,
-    with_edit_bones,
-)
+from tests.animation.bones.rigs import BETWEEN, moving_rig, with_edit_bones
 from tests.animation.keyed import curves_of
 from tests.animation.modified import is_term
 

@@ -11,21 +11,12 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import (
-    NATIVE,
-    Refused,
-    is_reduced,
-    key_frames,
-    modes_of,
-    reduce_keys_of,
-    reduction_of,
-    restore_keys,
-    write_channel,
-)
+from rigid_motion.animation import NATIVE, Refused, reduce_keys_of, reduction_of, restore_keys, write_channel
 from rigid_motion.animation.baking import search
 from rigid_motion.animation.baking.motions import not_promised
 from tests.animation.bones.poses import shown_poses
 from tests.animation.bones.rigs import Rest, in_turn, new_rig
+from tests.animation.keyed import key_frames, mode_at
 from tests.animation.oracle import shown_worlds
 from tests.balls import largest_displacements
 from tests.rigs.recorded import FRAMES, NAMES, recorded_rig
@@ -82,7 +73,7 @@ def test_a_rig_that_moves_itself_has_its_keys_on_the_key_poses_and_their_error_i
     assert keys == keys[:1] * len(keys)
     for item, some in zip(every, keys, strict=True):
         assert (reduction_of(item).before, reduction_of(item).after) == (len(FRAMES), len(some))
-        assert set(modes_of(item, key_frames(item))) == {"BLENDER" if mode == NATIVE else mode}
+        assert {mode_at(item, frame) for frame in some} == {"BLENDER" if mode == NATIVE else mode}
     assert len(keys[0]) == reduction.rig.frames == (count or len(keys[0])) < 0.5 * len(FRAMES)
     worst = max(*errors(rig, truth, moments).values(), largest(shown_worlds([rig], moments)[0], place).max())
     assert reduction.largest_error == pytest.approx(worst, abs=2e-6)
@@ -151,7 +142,7 @@ def test_bones_that_cannot_be_reduced_say_so_and_the_others_are(live_file):
     reasons = {str(refusal).split()[0].removeprefix("Body/"): str(refusal) for refusal in refused}
     assert sorted(reasons) == ["Arm.L", "Hand.L", "Hand.R", "Head"]
     assert all("not uniform or passes zero" in reasons[name] for name in ("Arm.L", "Hand.L"))
-    assert [bone.name for bone in bones(rig) if is_reduced(bone)] == ["Root", "Spine", "Arm.R"]
+    assert [bone.name for bone in bones(rig) if reduction_of(bone) is not None] == ["Root", "Spine", "Arm.R"]
     assert max(errors(rig, truth).values()) <= TOLERANCE * (1.0 + 1e-4)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from rigid_motion import animation
 from tests.animation.bones.rigs import Rest, new_rig
-from tests.animation.keyed import WIDTHS, Carrier, curves_of
+from tests.animation.keyed import Carrier
 from tests.animation.scenes import key, new_object
 
 FRAMES = np.arange(0.0, 62.0, 1.75)
@@ -65,42 +65,3 @@ def stage(live_file) -> Callable[[str], Carrier]:
 
 def update() -> None:
     bpy.context.view_layer.update()
-
-
-def spaces(prop: Carrier) -> list[tuple[float, int]]:
-    """Return the frames of switches, and the numbers of the new holders."""
-    return [(switch.frame, switch.after) for switch in animation.queries.keyed.source_of(prop).switches]
-
-
-def influence(prop: Carrier, constraint: str) -> bpy.types.FCurve:
-    return next(c for (path, _), c in curves_of(prop).items() if f'"{constraint}"].influence' in path)
-
-
-def moving(prop: Carrier) -> list[bpy.types.FCurve]:
-    return [curve for (path, _), curve in curves_of(prop).items() if path in WIDTHS]
-
-
-def retime(prop: Carrier, to: Callable[[float], float], curves: Sequence[bpy.types.FCurve] | None = None) -> None:
-    for fcurve in curves or curves_of(prop).values():
-        for point in fcurve.keyframe_points:
-            point.co_ui.x = to(point.co.x)
-        fcurve.update()
-
-
-def delete(prop: Carrier, frame: float) -> None:
-    for fcurve in moving(prop):
-        for point in reversed(fcurve.keyframe_points):
-            if abs(point.co.x - frame) < 0.01:
-                fcurve.keyframe_points.remove(point)
-        fcurve.update()
-
-
-def copy(prop: Carrier, frame: float, by: float) -> None:
-    """Duplicate keys as Shift D does."""
-    for fcurve in moving(prop):
-        there = next(point for point in fcurve.keyframe_points if abs(point.co.x - frame) < 0.01)
-        fields = {field: getattr(there, field) for field in ("back", "amplitude", "period")}
-        made = fcurve.keyframe_points.insert(there.co.x + by, there.co.y)
-        for field, value in fields.items():
-            setattr(made, field, value)
-        fcurve.update()

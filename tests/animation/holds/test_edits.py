@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import bpy
 import numpy as np
@@ -13,28 +13,52 @@ from rigid_motion.animation.actions.marks import read_holds
 from rigid_motion.animation.following import refreshing
 from tests.animation.bones.rigs import in_turn, with_edit_bones
 from tests.animation.holds.model import assert_held
-from tests.animation.holds.staging import (
-    FRAMES,
-    LET_GO,
-    PASSED,
-    PICKED_UP,
-    PROPS,
-    copy,
-    delete,
-    found,
-    go_to,
-    influence,
-    moving,
-    retime,
-    spaces,
-    stage,
-    update,
-)
-from tests.animation.keyed import Carrier, snapshot
+from tests.animation.holds.staging import FRAMES, LET_GO, PASSED, PICKED_UP, PROPS, found, go_to, stage, update
+from tests.animation.keyed import WIDTHS, Carrier, curves_of, snapshot
 from tests.animation.oracle import shown_worlds, world_of
 from tests.animation.scenes import key, new_object, push_down
 
 __all__ = ["stage"]
+
+
+def spaces(prop: Carrier) -> list[tuple[float, int]]:
+    """Return the frames of switches, and the numbers of the new holders."""
+    return [(switch.frame, switch.after) for switch in animation.queries.keyed.source_of(prop).switches]
+
+
+def influence(prop: Carrier, constraint: str) -> bpy.types.FCurve:
+    return next(c for (path, _), c in curves_of(prop).items() if f'"{constraint}"].influence' in path)
+
+
+def moving(prop: Carrier) -> list[bpy.types.FCurve]:
+    return [curve for (path, _), curve in curves_of(prop).items() if path in WIDTHS]
+
+
+def retime(prop: Carrier, to: Callable[[float], float], curves: Sequence[bpy.types.FCurve] | None = None) -> None:
+    for fcurve in curves or curves_of(prop).values():
+        for point in fcurve.keyframe_points:
+            point.co_ui.x = to(point.co.x)
+        fcurve.update()
+
+
+def delete(prop: Carrier, frame: float) -> None:
+    for fcurve in moving(prop):
+        for point in reversed(fcurve.keyframe_points):
+            if abs(point.co.x - frame) < 0.01:
+                fcurve.keyframe_points.remove(point)
+        fcurve.update()
+
+
+def copy(prop: Carrier, frame: float, by: float) -> None:
+    """Duplicate keys as Shift D does."""
+    for fcurve in moving(prop):
+        there = next(point for point in fcurve.keyframe_points if abs(point.co.x - frame) < 0.01)
+        fields = {field: getattr(there, field) for field in ("back", "amplitude", "period")}
+        made = fcurve.keyframe_points.insert(there.co.x + by, there.co.y)
+        for field, value in fields.items():
+            setattr(made, field, value)
+        fcurve.update()
+
 
 SAME = [(PICKED_UP, 1), (PASSED, 2), (LET_GO, 0)]
 

@@ -12,7 +12,7 @@ from numpy.polynomial import Chebyshev
 
 from rigid_motion.animation.terms.apply import write
 from rigid_motion.animation.terms.carriers import MAX_CHAIN_PRODUCTS, Term, carry
-from tests.animation.fcurves.examples import as_fcurve, keys_of
+from tests.animation.fcurves.test_fcurves import as_fcurve, keys_of
 from tests.thoroughness import tried
 
 TOLERANCE = 1e-6
