@@ -310,3 +310,16 @@ def test_a_key_of_a_single_component_does_no_more(live_file, mode):
     set_mode(prop, mode)
     assert with_key(prop, 26, index=1) < MOVING
     assert with_key(prop, 60, index=0) < MOVING
+
+
+def test_a_key_at_rest_that_is_moved_is_hit(live_file):
+    prop, _, _ = thrown(PASSES[0])
+    calm(prop)
+    assert with_key(prop, 60) < MOVING
+    bpy.context.scene.frame_set(60)
+    prop.location.x += 0.1
+    posed = np.array(prop.location)
+    prop.keyframe_insert("location", frame=60)
+    for frame in (10, 60):
+        bpy.context.scene.frame_set(frame)
+    assert np.abs(np.array(prop.location) - posed).max() < RESTING

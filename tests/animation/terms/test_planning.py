@@ -85,14 +85,12 @@ def bounce(frames: np.ndarray) -> np.ndarray:
 
 EIGHTHS, SIXTEENTHS = 1 / 8, 1 / 16
 FOLLOWED: dict[str, tuple] = {
-    "smooth": (hump, (), SIXTEENTHS, 2),
     "breaks that are none": (hump, (7.28, 9.0), SIXTEENTHS, 2),
     "a break": (bounce, (7.28,), SIXTEENTHS, 6),
     "a break that is not told": (bounce, (), EIGHTHS, 99),
     "a steep beginning": (lambda frames: np.sqrt(abs(frames - 1.0)) * (21.0 - frames) / 20, (), EIGHTHS, 99),
     "a steep end": (lambda frames: np.sqrt(abs(21.0 - frames)) * (frames - 1.0) / 20, (), EIGHTHS, 99),
     "steep between": (lambda frames: np.cbrt(frames - 11.0) * hump(frames), (), EIGHTHS, 99),
-    "fast waves": (lambda frames: 0.1 * np.sin(3.0 * frames) + 0.1, (), EIGHTHS, 99),
 }
 """A difference and its breaks, the frames on which terms must follow it, and the maximum number of terms."""
 
