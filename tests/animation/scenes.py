@@ -42,13 +42,14 @@ def key(
     frames: Sequence[float] = FRAMES,
     *,
     seed: int = 0,
+    location: bool = True,
     scale: str | None = None,
     interpolation: str = "BEZIER",
 ) -> Carrier:
     """Key location, rotation and (with scale "even" or "uneven") scale at random on these frames."""
     # Each bone of a rig moves differently.
     seed += 0 if isinstance(carrier, bpy.types.Object) else sum(map(ord, carrier.name))
-    for path in ("location", rotation_path(carrier), *(["scale"] if scale else [])):
+    for path in (*(["location"] if location else []), rotation_path(carrier), *(["scale"] if scale else [])):
         values = random_values(carrier, path, len(frames), seed, scale == "even")
         write(carrier, path, np.array(frames), values, interpolation)
     return carrier

@@ -31,7 +31,7 @@ def drawn(menu):
 
     layout = Mock(spec=["menu_pie", "separator", "menu", "operator_menu_enum"], operator=operator)
     layout.menu_pie.return_value = layout
-    own = {name: getattr(menu, name, None) for name in ("scope", "pie", "menu", "beside")}
+    own = {name: getattr(menu, name, None) for name in ("scope", "pie", "menu", "other_menu")}
     menu.draw(SimpleNamespace(layout=layout, **own), bpy.context)
     return result
 
