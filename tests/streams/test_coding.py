@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 
 import numpy as np
 import pytest
@@ -11,13 +10,10 @@ import pytest
 from research.making import stream_tables
 from rigid_motion.streams.coding import (
     BASES_TABLE,
-    FIRST_LONG_MAGNITUDE,
-    FLAG_TABLE_COUNT,
     FREQUENCY_TOTAL,
     KNOT_COUNTS,
     TABLE_FILE,
     Coder,
-    bucket,
     standard_tables,
 )
 from rigid_motion.streams.wire import WIRE_VERSION
@@ -50,47 +46,6 @@ def test_what_is_written_is_read(seed: int) -> None:
     assert read == [symbol for *_, symbol in written]
 
 
-@pytest.mark.parametrize("count", [0, 1, 16, 17, 48, 51])
-def test_numbers_of_many_digits_are_read(count: int) -> None:
-    numbers, encoder = [0, (1 << count) - 1, (1 << count) // 3], Coder()
-    for number in numbers:
-        encoder.digits(count, number)
-    decoder = Coder(encoder.finish())
-    assert [decoder.digits(count) for _ in numbers] == numbers
-
-
-def test_symbols_cost_what_their_frequencies_say() -> None:
-    rng, own = np.random.default_rng(1), (0, 3500, 4000, FREQUENCY_TOTAL)
-    symbols = rng.choice(3, 4000, p=np.diff(own) / FREQUENCY_TOTAL)
-    encoder = Coder(tables=[own])
-    for symbol in symbols.tolist():
-        encoder.symbol(0, symbol)
-    ideal = -np.log2(np.diff(own) / FREQUENCY_TOTAL)[symbols].sum() / 8.0
-    assert ideal <= len(encoder.finish()) <= ideal * 1.002 + 2.0
-
-
-def test_nothing_said_is_no_bytes() -> None:
-    assert Coder().finish() == b""
-
-
-@pytest.mark.parametrize("seed", range(50))
-def test_any_bytes_are_some_symbols(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    decoder = Coder(rng.bytes(int(rng.integers(0, 60))), [table(rng, 7)])
-    assert all(0 <= decoder.symbol(0) < 7 and 0 <= decoder.flat(1000) < 1000 for _ in range(300))
-
-
-def test_the_tables_are_whole() -> None:
-    symbols = [len(own) - 1 for own in standard_tables()]
-    assert symbols[:KNOT_COUNTS] == [2] * FLAG_TABLE_COUNT + [FIRST_LONG_MAGNITUDE + 1] * (
-        KNOT_COUNTS - FLAG_TABLE_COUNT
-    )
-    for own in standard_tables():
-        assert (own[0], own[-1]) == (0, FREQUENCY_TOTAL)
-        assert all(low < high for low, high in itertools.pairwise(own))
-    assert symbols[KNOT_COUNTS:] == [32, 21, 4, 4, 3, 2, 2]
-
-
 def test_the_tables_are_those_of_this_version_of_the_wire() -> None:
     assert (
         WIRE_VERSION,
@@ -112,7 +67,3 @@ def test_the_maker_counts_into_tables_that_are_whole_and_keeps_those_without_cou
     assert [len(own) for own in made] == [len(own) for own in standard_tables()]
     assert all((own[0], own[-1]) == (0, FREQUENCY_TOTAL) and min(np.diff(own)) > 0 for own in made)
     assert np.diff(made[BASES_TABLE]).tolist() == [1, FREQUENCY_TOTAL - 2, 1]
-
-
-def test_buckets() -> None:
-    assert [bucket(value, 8) for value in (0, 1, 2, 3, 4, 5, 8, 9, 16, 17, 10**6)] == [0, 1, 2, 3, 3, 4, 4, 5, 5, 6, 7]
