@@ -9,7 +9,7 @@ import bpy
 import pytest
 
 import rigid_motion.live.receiving as receiving
-from tests.live.performing import Sent
+from tests.live.performing import FIRST, FPS, Sent
 
 
 @pytest.fixture
@@ -33,7 +33,10 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 @pytest.fixture
 def live(extension) -> bpy.types.PropertyGroup:
-    """The live settings of the scene."""
+    """The live settings of a scene at the frame where recordings begin."""
+    extension.scene.render.fps = FPS
+    extension.scene.frame_set(FIRST)
+    extension.scene.rigid_motion_live.mode = "lerp_slerp"
     return extension.scene.rigid_motion_live
 
 

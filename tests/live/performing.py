@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import bpy
 import numpy as np
@@ -31,6 +31,9 @@ REST = Poses(PLACES, STILL)
 BODY = StreamBody("dancer", JOINTS, PARENTS, REST)
 SKELETON = Skeleton(PARENTS)
 TIMES_OF_A_SECOND = np.arange(60) / 60.0
+
+FPS, FIRST, BEGINS = 30, 10, 30
+"""Frames per second, the first frame of a recording, and the sample that is shown on it."""
 
 
 def dance(times: np.ndarray) -> Poses:
@@ -73,6 +76,30 @@ class Sent:
 
     def close(self) -> None:
         self._socket.close()
+
+
+def record(
+    sent: Sent, clock: list[float], frames: Iterable[list[bytes]], on_row: Callable[[int], None] = lambda row: None
+) -> None:
+    """Send the datagrams of 60 samples a second, and record them from sample BEGINS on; `on_row` follows each."""
+    for row, datagrams in enumerate(frames):
+        clock[0] += 1.0 / 60.0
+        sent.send(datagrams, clock[0])
+        if row == BEGINS:
+            assert bpy.ops.rigid_motion.live_record() == {"FINISHED"}
+        on_row(row)
+    assert bpy.ops.rigid_motion.live_finish("EXEC_DEFAULT", True) == {"FINISHED"}
+
+
+def frame_of(row: float, delay: float) -> float:
+    """Return the frame of a recording that shows a sample, if what is shown is this many seconds late."""
+    return round(FIRST + ((row - BEGINS) / 60.0 + delay) * FPS, 9)
+
+
+def show(row: float, delay: float) -> None:
+    """Set the scene to the frame that shows a sample."""
+    frame = frame_of(row, delay)
+    bpy.context.scene.frame_set(int(np.floor(frame)), subframe=frame % 1.0)
 
 
 def new_rig(prefix: str = "", larger: float = 1.0, turned_by: float = 0.3) -> bpy.types.Object:

@@ -16,15 +16,12 @@ from rigid_motion.live.driving import seen_hand, unscaled
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.streams import Sender, StreamBody
-from tests.live.performing import BODY, JOINTS, dance, in_world, new_rig
+from tests.live.performing import BEGINS, BODY, FIRST, JOINTS, dance, frame_of, in_world, new_rig, record, show
 from tests.rigs.human import human
 
 pytestmark = [pytest.mark.network, pytest.mark.any_blender]
 
 TIMES = np.arange(180) / 60.0
-FIRST, BEGINS = 10, 30
-"""The first frame of a recording, and the sample that is shown on it."""
-
 DELAY, TOLERANCE = 0.1, 0.005
 RADIUS = 0.1
 """Radius of the ball around the tool, whose points are off by the tolerance at most."""
@@ -38,14 +35,6 @@ PLAYED = np.arange(40, 160)
 
 SLIP = 2e-6
 """Error caused by holding itself, at most, in metres."""
-
-
-@pytest.fixture
-def live(extension):
-    extension.scene.render.fps = 30
-    extension.scene.frame_set(FIRST)
-    extension.scene.rigid_motion_live.mode = "lerp_slerp"
-    return extension.scene.rigid_motion_live
 
 
 def hand_at(row: int) -> str | None:
@@ -81,19 +70,13 @@ def datagrams_of(*, holds: bool) -> list[tuple[list[bytes], list[bytes]]]:
 def perform(
     sent, clock, *, holds: bool = True, loss: float = 0.0, until: int | None = None, on_row=lambda row: None
 ) -> None:
-    """Send a dance with a sword, losing a fraction of the datagrams, and record it from sample BEGINS on."""
+    """Send and record a dance with a sword, losing a fraction of the datagrams."""
     rng = np.random.default_rng(3)
-    for row, (described, datagrams) in enumerate(datagrams_of(holds=holds)[:until]):
-        clock[0] += 1.0 / 60.0
-        sent.send(described + [datagram for datagram in datagrams if rng.random() >= loss], clock[0])
-        if row == BEGINS:
-            assert bpy.ops.rigid_motion.live_record() == {"FINISHED"}
-        on_row(row)
-    assert bpy.ops.rigid_motion.live_finish("EXEC_DEFAULT", True) == {"FINISHED"}
-
-
-def frame_of(row: float) -> float:
-    return round(FIRST + (row / 60.0 - TIMES[BEGINS] + DELAY) * 30, 9)
+    frames = [
+        described + [datagram for datagram in datagrams if rng.random() >= loss]
+        for described, datagrams in datagrams_of(holds=holds)[:until]
+    ]
+    record(sent, clock, frames, on_row)
 
 
 def seen_sword() -> Poses:
@@ -104,8 +87,8 @@ def seen_sword() -> Poses:
 def play(rows: np.ndarray) -> tuple[Poses, list[Poses]]:
     """Return the poses of the sword at samples (n,) of the recording, in the world and in each of the hands."""
     swords, grips, rig = [], [[], []], next(obj for obj in bpy.context.scene.objects if obj.type == "ARMATURE")
-    for frame in map(frame_of, rows.tolist()):
-        bpy.context.scene.frame_set(int(np.floor(frame)), subframe=frame % 1.0)
+    for row in rows.tolist():
+        show(row, DELAY)
         swords.append(seen_sword())
         for hand, poses in zip(HANDS, grips, strict=True):
             poses.append(placed(inverse(seen_hand((rig.name, hand))), swords[-1]))
@@ -138,7 +121,7 @@ def test_what_was_held_has_keys_in_the_hands_and_stays_in_them_when_they_are_edi
     live.armature, live.mode = (rig := new_rig()), mode
     perform(sent, clock)
     receiving.stop()
-    sword, takes = bpy.data.objects["sword"], [frame_of(row) for row in TAKES]
+    sword, takes = bpy.data.objects["sword"], [frame_of(row, DELAY) for row in TAKES]
     assert [(item.target, item.subtarget) for item in sword.constraints] == [(rig, hand) for hand in HANDS]
     assert influences(sword) == {
         "Held In LeftHand": [(FIRST, 0.0), (takes[0], 1.0), (takes[1], 0.0)],
@@ -197,7 +180,7 @@ def test_what_is_not_held_any_more_is_shown_and_recorded_in_the_world_over_keys_
 
     def look(row: int) -> None:
         if row == BEGINS - 5:
-            bpy.context.scene.frame_set(round(frame_of(TAKES[0] + 20)))
+            show(TAKES[0] + 20, DELAY)
             bpy.context.view_layer.update()
             assert off_by(stacked([seen_sword()]), swords()[0]) < 1.02 * TOLERANCE
             bpy.context.scene.frame_set(FIRST)
@@ -217,8 +200,7 @@ def test_what_held_it_and_is_gone_leaves_it_in_the_world(live, sent, clock):
     receiving.stop()
     assert not bpy.data.objects["sword"].constraints
     for row in range(40, TAKES[1]):
-        frame = frame_of(row)
-        bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
+        show(row, DELAY)
         assert off_by(stacked([seen_sword()]), swords()[row]) < 2.0 * TOLERANCE, row
 
 
@@ -244,25 +226,22 @@ def test_bodies_hold_one_another_and_skeletons_that_are_held_have_keys_in_the_wo
     sender = Sender([sword, BODY, glove], TOLERANCE, DELAY, rate=60.0)
     sender.hold("sword", "glove")
     sender.hold("dancer", "glove")
+    frames = []
     for row, moment in enumerate(TIMES[:120].tolist()):
-        clock[0] += 1.0 / 60.0
         hand = there[row : row + 1]
         datagrams = sender.add(moment, {"sword": placed(hand, GRIP), "dancer": poses[:, row], "glove": hand})
-        sent.send((sender.describe() if row < 2 else []) + datagrams, clock[0])
-        if row == BEGINS:
-            assert bpy.ops.rigid_motion.live_record() == {"FINISHED"}
-    assert bpy.ops.rigid_motion.live_finish() == {"FINISHED"}
+        frames.append((sender.describe() if row < 2 else []) + datagrams)
+    record(sent, clock, frames)
     receiving.stop()
     obj = bpy.data.objects["sword"]
     assert [(item.target.name, item.subtarget) for item in obj.constraints] == [("glove", "")]
     assert hold_facts(obj).now.name == "glove"
     assert not any(bone.constraints for bone in bpy.data.objects["dancer"].pose.bones)
-    for frame in (20.0, 30.3):
-        bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
-        moment = TIMES[BEGINS] - DELAY + (frame - FIRST) / 30
+    for row in (44.0, 64.6):
+        show(row, DELAY)
         glove_seen = unscaled(np.array(bpy.data.objects["glove"].matrix_world, dtype=np.float64))
         assert off_by(stacked([placed(inverse(glove_seen), seen_sword())]), GRIP) < 1.02 * TOLERANCE
-        head = in_world(dance(np.array([moment])))[JOINTS.index("Head"), 0].positions
+        head = in_world(dance(np.array([row / 60.0])))[JOINTS.index("Head"), 0].positions
         assert np.linalg.norm(seen_hand(("dancer", "Head")).positions - head) < 2.0 * TOLERANCE
 
 
@@ -278,8 +257,8 @@ def test_a_rig_of_rigify_holds_by_what_follows_its_hands_by_ik_as_well(live, sen
             if "IK_FK" in bone:
                 bone["IK_FK"] = 1.0 - ik
         poses = []
-        for frame in map(frame_of, rows.tolist()):
-            bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
+        for row in rows.tolist():
+            show(row, DELAY)
             poses.append(placed(inverse(seen_hand((rig.name, "DEF-hand.L"))), seen_sword()))
         grips.append(stacked(poses))
     assert off_by(grips[1], grips[0]) < TOLERANCE

@@ -12,36 +12,15 @@ from rigid_motion.animation.transforms import transform_of
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion.streams import Sender, StreamBody
-from tests.live.performing import BODY, dance, frames_of_vmc, heads_of, in_world, new_rig
+from tests.live.performing import BEGINS, BODY, FIRST, dance, frames_of_vmc, heads_of, in_world, new_rig, record, show
 
 pytestmark = [pytest.mark.network, pytest.mark.any_blender]
 
 TIMES = np.arange(150) / 60.0
-FIRST, BEGINS = 10, 30
-"""The first frame of a recording, and the sample that is shown on it."""
-
 AGAIN = 80
 """The sample at which a sender starts again."""
 
 TOLERANCE = 0.002
-
-
-@pytest.fixture
-def live(extension):
-    extension.scene.render.fps = 30
-    extension.scene.frame_set(FIRST)
-    return extension.scene.rigid_motion_live
-
-
-def record(sent, clock, frames: list[list[bytes]]) -> None:
-    """Send all frames, and record from sample BEGINS on."""
-    for row, datagrams in enumerate(frames):
-        clock[0] = 50.0 + TIMES[row]
-        sent.send(datagrams, clock[0])
-        if row == BEGINS:
-            assert bpy.ops.rigid_motion.live_record() == {"FINISHED"}
-    assert bpy.ops.rigid_motion.live_finish() == {"FINISHED"}
-    receiving.stop()
 
 
 def off_by(rig: bpy.types.Object, delay: float = 0.0, part: str = "head") -> float:
@@ -50,8 +29,7 @@ def off_by(rig: bpy.types.Object, delay: float = 0.0, part: str = "head") -> flo
     arms = np.array([getattr(bone, f"{part}_local") - bone.head_local for bone in rig.data.bones])
     world = there.positions + rotate(there.quaternions, arms[:, None])
     for row in range(BEGINS + 1 - round(60 * delay), len(TIMES) - 20, 3):
-        frame = FIRST + (TIMES[row] - TIMES[BEGINS] + delay) * 30
-        bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
+        show(row, delay)
         bpy.context.view_layer.update()
         shown = np.array([rig.matrix_world @ getattr(bone, part) for bone in rig.pose.bones])
         worst = max(worst, float(np.linalg.norm(shown - world[:, row], axis=1).max()))
@@ -67,6 +45,7 @@ def counts(obj: bpy.types.Object) -> list[int]:
 def test_vmc_is_thinned_within_the_tolerance_and_plays_again(live, sent, clock, mode):
     live.armature, live.mode, live.tolerance = (rig := new_rig()), mode, TOLERANCE
     record(sent, clock, frames_of_vmc(TIMES))
+    receiving.stop()
     assert rig.animation_data.action.name == "Rig Live"
     assert rig.animation_data.action.frame_range[0] == FIRST
     # Blender's own interpolation of quaternions does not take the shortest way.
@@ -77,14 +56,15 @@ def test_vmc_is_thinned_within_the_tolerance_and_plays_again(live, sent, clock, 
 
 
 def test_what_had_come_and_was_not_shown_when_a_recording_began_is_in_it(live, sent, clock):
-    live.armature, live.mode, live.tolerance = (rig := new_rig()), "lerp_slerp", TOLERANCE
+    live.armature, live.tolerance = (rig := new_rig()), TOLERANCE
     receiving.listening()._receiver.delay = 0.3
     record(sent, clock, frames_of_vmc(TIMES))
+    receiving.stop()
     assert off_by(rig, 0.3) < 1.05 * TOLERANCE
 
 
 def test_what_comes_by_the_codec_has_keys_at_the_moments_that_were_sent(live, sent, clock):
-    live.armature, live.mode = (rig := new_rig()), "lerp_slerp"
+    live.armature = rig = new_rig()
     sender, poses, ball = Sender([BODY, StreamBody.rigid("ball")], 0.005, 0.1, rate=60.0), dance(TIMES), []
     frames = []
     for row, moment in enumerate(TIMES.tolist()):
@@ -92,6 +72,7 @@ def test_what_comes_by_the_codec_has_keys_at_the_moments_that_were_sent(live, se
         frames.append(sender.add(moment, {"dancer": poses[:, row], "ball": ball[-1]}))
     frames[0] = sender.describe() + frames[0]
     record(sent, clock, frames)
+    receiving.stop()
     assert off_by(rig, 0.1) < 0.006
     (fcurve, *_) = channelbag_of(bpy.data.objects["ball"]).fcurves
     keys = np.array([key.co[0] for key in fcurve.keyframe_points])
@@ -115,6 +96,7 @@ def test_what_never_moves_has_a_single_key(live, sent, clock):
     live.armature = rig = new_rig()
     frames = [frames_of_vmc(TIMES[:1] * 0)[0][:-1] + frame[-1:] for frame in frames_of_vmc(TIMES)[:60]]
     record(sent, clock, frames)
+    receiving.stop()
     assert min(counts(rig)) == 1
 
 
@@ -138,18 +120,14 @@ def test_what_is_deleted_while_it_is_recorded_has_no_keys_and_no_error(live, sen
 def test_a_sender_that_begins_again_is_recorded_on(live, sent, clock):
     live.armature = rig = new_rig()
     first, again = Sender([BODY], rate=60.0), Sender([BODY], rate=60.0)
-    poses = dance(TIMES)
+    poses, frames = dance(TIMES), []
     for row, moment in enumerate(TIMES.tolist()):
         sender, own = (first, moment) if row < AGAIN else (again, moment - TIMES[AGAIN] + 900.0)
-        clock[0] = 50.0 + moment
         begins = sender.describe() if row in (0, AGAIN) else []
-        sent.send(begins + sender.add(own, poses[:, row]), clock[0])
-        if row == BEGINS:
-            bpy.ops.rigid_motion.live_record()
-    assert bpy.ops.rigid_motion.live_finish() == {"FINISHED"}
+        frames.append(begins + sender.add(own, poses[:, row]))
+    record(sent, clock, frames)
     receiving.stop()
     world = in_world(poses).positions
     for row in (50, 70, 110, 130):
-        frame = FIRST + (TIMES[row] - TIMES[BEGINS] + 0.1) * 30
-        bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
+        show(row, 0.1)
         assert np.linalg.norm(heads_of(rig) - world[:, row], axis=1).max() < 0.03

@@ -111,17 +111,6 @@ def test_what_is_taken_up_and_thrown_is_within_the_tolerance(rate: float, answer
     assert slips(outcome.shown, "left")[held].max() <= SLIP
 
 
-def test_a_joint_of_a_skeleton_holds_what_comes_before_it() -> None:
-    own = body()
-    times, poses = dance(own, 3.0)
-    tool = in_hand(own.skeleton.in_root_space(poses)[4])
-    says = {0: ("tool", "performer", "joint 4")}
-    outcome = run([TOOL, own], times, joined((tool[None], poses)), says=says, rate=60.0)
-    held = outcome.shown[-1].held["tool"]
-    assert (held.body, held.joint) == ("performer", "joint 4")
-    assert outcome.errors.max() <= 0.005 * SLACK
-
-
 def test_keys_are_in_the_world_and_do_not_go_between_two_hands() -> None:
     times, left, right = hands(4.0)
     taken = 120

@@ -7,27 +7,10 @@ import pytest
 
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Receiver
-from rigid_motion.streams.playing import MAX_FORWARD_RATIO, Fading, Playing
+from rigid_motion.streams.playing import MAX_FORWARD_RATIO, Fading
 from rigid_motion.streams.vmc import write
 
 DELAY, RATE = 0.1, 60.0
-
-
-@pytest.mark.parametrize("looks", [0.02, 0.3, 0.4, 0.7, 1.0, 1.2, 1.7])
-def test_the_picture_goes_on_however_seldom_somebody_looks(looks: float) -> None:
-    playing, sent, moments = Playing(DELAY), 0, []
-    times = np.arange(0.0, 20.0, looks)
-    for now in times.tolist():
-        while sent / RATE <= now:
-            playing.heard(sent / RATE, now)
-            sent += 1
-        moments.append(playing.moment(now))
-    late = times > 8.0
-    behind = times[late] - np.array(moments)[late]
-    assert np.diff(moments)[late[1:]].min() > 0.9 * looks
-    # The shown moment has been received, and is no older than necessary.
-    assert behind.min() >= DELAY
-    assert behind.max() <= DELAY + looks + 2.0 / RATE
 
 
 @pytest.mark.parametrize("fps", [30.0, 72.0, 240.0])
@@ -53,11 +36,11 @@ def test_what_was_shown_too_far_ahead_waits_and_does_not_go_back(speed: float, f
         assert np.abs(off[round((0.4 + ahead / MAX_FORWARD_RATIO / speed) * fps) :]).max() < most
 
 
-@pytest.mark.parametrize("looks", [0.35, 1.0, 1.3])
-def test_a_performer_is_where_it_was_at_the_moment_that_is_shown(looks: float) -> None:
-    receiver, sent = Receiver(DELAY), 0
-    shown = []
-    for now in np.arange(0.0, 15.0, looks).tolist():
+@pytest.mark.parametrize("looks", [0.02, 0.3, 0.4, 0.7, 1.0, 1.2, 1.7])
+def test_the_picture_goes_on_however_seldom_somebody_looks(looks: float) -> None:
+    receiver, sent, shown = Receiver(DELAY), 0, []
+    times = np.arange(0.0, 20.0, looks)
+    for now in times.tolist():
         while sent / RATE <= now:
             hips = Poses([np.sin(sent / RATE), 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])
             for datagram in write(sent / RATE, {"Hips": hips}):
@@ -65,6 +48,11 @@ def test_a_performer_is_where_it_was_at_the_moment_that_is_shown(looks: float) -
             sent += 1
         shown += receiver.show(now).values()
     moments = np.array([what.moment for what in shown])
-    assert np.diff(moments[4:]).min() > 0.5 * looks
-    places = [what.poses["VMC"].positions[1, 0] for what in shown]
-    np.testing.assert_allclose(places[4:], np.sin(moments[4:]), atol=1e-3)
+    late = times[-len(moments) :] > 8.0
+    behind = (times[-len(moments) :] - moments)[late]
+    assert np.diff(moments[late]).min() > 0.9 * looks
+    # The shown moment has been received, and is no older than necessary.
+    assert behind.min() >= DELAY
+    assert behind.max() <= DELAY + looks + 2.0 / RATE
+    places = np.array([what.poses["VMC"].positions[1, 0] for what in shown])
+    np.testing.assert_allclose(places[late], np.sin(moments[late]), atol=1e-3)

@@ -88,20 +88,6 @@ def test_a_receiver_with_a_busy_processor(bursts: float, answers: bool) -> None:
     assert (outcome.now - outcome.moments)[outcome.now > 4.5].max() < 0.1 + 0.02 + bursts + 0.02
 
 
-def test_copies_and_old_datagrams_change_nothing() -> None:
-    own = body()
-    samples = dance(own, 5.0)
-    outcome, copied = run([own], *samples), run([own], *samples, copies=3)
-    np.testing.assert_allclose(copied.errors, outcome.errors, atol=2e-3)
-    receiver, now = outcome.receiver, 1005.0
-    before = next(iter(receiver.show(now).values()))
-    for _, datagram in outcome.datagrams[-60:]:
-        receiver.take(datagram, now + 0.001, "sender")
-    after = next(iter(receiver.show(now).values()))
-    assert after.moment == before.moment
-    np.testing.assert_array_equal(after.poses[own.name].positions, before.poses[own.name].positions)
-
-
 @pytest.mark.parametrize(("number", "answers"), combined([1, 2, 3, *range(4, 24, 4)], [True, False]))
 def test_a_datagram_that_is_lost_costs_no_later_one_its_meaning(number: int, answers: bool) -> None:
     own = body(8)
@@ -180,42 +166,6 @@ def test_a_sender_that_begins_again_is_told_by_its_identity_and_replays_of_the_o
         if time > 2.2:
             assert [stream.identity for stream in shown] == [sender.identity]
     assert [1.8 < one.moment < 2.0 for one in shown.values()] == [True]
-
-
-def test_several_senders_do_not_mix() -> None:
-    own = body()
-    times, poses = dance(own, 2.0)
-    receiver, alone = Receiver(), Receiver()
-    senders = [Sender([own], rate=60.0) for _ in range(3)]
-    for row, time in enumerate(times.tolist()):
-        for number, sender in enumerate(senders):
-            for datagram in sender.add(time, poses[:, (row * (number + 1)) % len(times)]):
-                receiver.take(datagram, time, number)
-                if number == 1:
-                    alone.take(datagram, time, number)
-        shown, expected = receiver.show(time), alone.show(time)
-    assert len(shown) == 3
-    ((stream, only),) = expected.items()
-    np.testing.assert_array_equal(only.poses[own.name].positions, shown[stream].poses[own.name].positions)
-
-
-def test_keys_can_be_recorded() -> None:
-    own = body()
-    times, poses = dance(own, 4.0)
-    sender, receiver = Sender([own], rate=60.0), Receiver()
-    moments, places = [], []
-    for row, time in enumerate(times.tolist()):
-        talk(sender, receiver, time, poses[:, row])
-        new = receiver.keys()
-        for keys in new:
-            moments += keys.moments.tolist()
-            places += keys.poses[own.name].positions[0].tolist()
-    assert np.diff(moments).min() > 0.0
-    assert moments[-1] > 3.6
-    # Far fewer keys than samples, and they hold the motion.
-    assert len(moments) < 0.8 * len(times)
-    true = np.stack([np.interp(moments, times, column) for column in poses.positions[0].T], axis=-1)
-    assert np.abs(np.array(places) - true).max() < 0.006
 
 
 @pytest.mark.slow
