@@ -4,7 +4,6 @@ How to use it::
 
     before, after = File(path), File(reduced)
     after.points("Walk", times)                # Points by owner: {"mesh of node 3": (times, n, 3), ...}.
-    vertices(path, 0, times)                   # The same as one array, (times, all points, 3).
     error, what, time = off(before, after, 0)  # The largest world displacement, at eighths of the gaps between keys.
 
 Clips are numbers or names. The points are the vertices of each primitive of each node of a scene (rigid, skinned,
@@ -131,7 +130,7 @@ class File:
         animation, result = self.json["animations"][self.clip(clip)], {}
         for channel in animation["channels"]:
             target, sampler = channel["target"], animation["samplers"][channel["sampler"]]
-            if (key := _moved_target(target)) is None:
+            if (key := moved_target(target)) is None:
                 continue
             interpolation = sampler.get("interpolation", "LINEAR")
             times, values = self.numbers(sampler["input"])[:, 0], self.numbers(sampler["output"])
@@ -251,13 +250,6 @@ class File:
         return np.concatenate([_applied(world @ own, places) for own in composed(**dict(named))], axis=1)
 
 
-def vertices(file: Path | File, clip: int | str, times: np.ndarray, radius: float = 0.0) -> np.ndarray:
-    """Return world positions of all geometry, shape (times, points, 3); with a radius also of points around nodes."""
-    file = File(file) if isinstance(file, Path) else file
-    around = file.around(clip, radius) if radius else None
-    return np.concatenate(list(file.points(clip, np.asarray(times), around).values()), axis=1)
-
-
 def moments(*files: File, clip: int | str) -> np.ndarray:
     """Return all keys of these files in a clip, and eighths of the gaps between them."""
     return eighths(np.unique(np.concatenate([file.moments(clip) for file in files])))
@@ -337,7 +329,7 @@ def _local(node: dict[str, Any], number: int, tracks: dict[tuple[int, str], Trac
     return composed(**values)
 
 
-def _moved_target(target: dict[str, Any]) -> tuple[int, str] | None:
+def moved_target(target: dict[str, Any]) -> tuple[int, str] | None:
     """Return the node, or -1 - mesh, and the path that a channel moves; None for other targets."""
     if target["path"] != "pointer":
         return (target["node"], target["path"]) if "node" in target else None

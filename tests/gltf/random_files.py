@@ -35,7 +35,7 @@ MOTIONS = ("smooth", "still", "spin", "noise", "jumps")
 INTERPOLATIONS = ("LINEAR", "STEP", "CUBICSPLINE", "wild", "any")
 """Wild: splines with tangents larger than the differences of values."""
 
-SHARED = ("nothing", "a view with a mesh", "samplers", "accessors of clips", "accessors of pointers")
+SHARED = ("nothing", "a view with a mesh", "samplers", "accessors of clips", "accessors of pointers", "a mesh")
 
 POINTERS = ("none", "beside", "above", "of weights", "of materials")
 
@@ -118,6 +118,8 @@ class _File:
             self._add_geometry(kind)
         if self.meshes:
             self.made.json["meshes"] = self.meshes
+            if choice.shared == "a mesh":
+                self._child(0, {"mesh": 0, "scale": [100.0] * 3})
         for clip in range(choice.clips):
             self._add_clip(clip)
         self._vendor()

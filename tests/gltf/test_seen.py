@@ -14,7 +14,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rigid_motion.gltf import Options, Report, errors, reduce_file
-from tests.gltf.player import REST, File, Track, eighths, off, shown
+from tests.gltf.player import REST, File, Track, eighths, moved_target, off, shown
 from tests.gltf.random_files import VENDOR, Choice, choices
 from tests.thoroughness import tried
 
@@ -69,13 +69,25 @@ def lasts(file: File, clip: int) -> tuple[float, float]:
 
 
 def channels_stay(before: File, after: File) -> None:
-    """Check that removed channels are in files with meshes, and at rest in all other clips."""
+    """Check that removed channels are of nodes, in files with meshes, and at rest in all other clips."""
     clips = [before.tracks(clip) for clip in range(len(clips_of(before)))]
     for clip, tracks in enumerate(clips):
+        assert other_channels(after, clip) == other_channels(before, clip)
         for node, path in tracks.keys() - after.tracks(clip).keys():
             assert before.has_meshes(), (clip, node, path)
             for track in (other[node, path] for other in clips if other is not tracks and (node, path) in other):
                 assert rests(before, node, path, track), (clip, node, path)
+
+
+def other_channels(file: File, clip: int) -> list[tuple[Any, ...]]:
+    """Return the targets of channels that move no node, with their times and values."""
+    animation = clips_of(file)[clip]
+    channels = [channel for channel in animation["channels"] if moved_target(channel["target"]) is None]
+    samplers = [animation["samplers"][channel["sampler"]] for channel in channels]
+    return [
+        (channel["target"], *(file.numbers(sampler[name]).tolist() for name in ("input", "output")))
+        for channel, sampler in zip(channels, samplers, strict=True)
+    ]
 
 
 def rests(file: File, node: int, path: str, track: Track) -> bool:
