@@ -13,7 +13,7 @@ from rigid_motion.motion.contacts import slide, slide_ratios
 from rigid_motion.motion.differences import turned_in_world
 from rigid_motion.motion.jitter import jitter
 from rigid_motion.motion.quaternions import align_signs, multiply, normalise, rotate
-from tests.motion.bodies import random_parents
+from tests.motion.bodies import in_root_space, largest_displacements, random_parents
 from tests.thoroughness import combined, tried
 
 NOISE, TURNS = 1e-3, np.radians(0.3)
@@ -99,18 +99,6 @@ def test_spikes_are_found_and_bridged(length):
     assert shell_error(cleaned.poses, truth).max() < 0.006
 
 
-def test_samples_that_repeat_the_one_before_are_bridged():
-    times, truth = hand(3)
-    shaky = shaken(truth, 3)
-    fast = int(np.argmax(np.linalg.norm(np.diff(truth.positions[50:-50], axis=0), axis=1))) + 50
-    rows = np.arange(fast, fast + 4)
-    positions, quaternions = shaky.positions.copy(), shaky.quaternions.copy()
-    positions[rows], quaternions[rows] = positions[fast - 1], quaternions[fast - 1]
-    cleaned = clean(times, Poses(positions, quaternions), tolerance=0.004)
-    assert np.flatnonzero(cleaned.repeats).tolist() == rows.tolist()
-    assert shell_error(cleaned.poses, truth)[rows].max() < 0.006
-
-
 @pytest.mark.parametrize(("length", "lost"), [(2, True), (6, True), (9, False)])
 def test_a_pose_that_comes_again_where_others_jitter_is_a_lost_sample_but_not_what_stands_still(length, lost):
     times, truth = hand(3)
@@ -118,22 +106,9 @@ def test_a_pose_that_comes_again_where_others_jitter_is_a_lost_sample_but_not_wh
     rows = np.arange(300, 300 + length)
     positions, quaternions = shaky.positions.copy(), shaky.quaternions.copy()
     positions[rows], quaternions[rows] = positions[299], quaternions[299]
-    cleaned = clean(times, Poses(positions, quaternions))
+    cleaned = clean(times, Poses(positions, quaternions), tolerance=0.004)
     assert np.flatnonzero(cleaned.repeats).tolist() == (rows.tolist() if lost else [])
-
-
-def test_a_drum_stroke_keeps_its_hit():
-    times = np.arange(400) / 100.0
-    # A stick that falls and bounces once a second.
-    phase = (times % 1.0) - 0.5
-    truth = Poses(np.stack([0.0 * times, 0.0 * times, 0.8 * np.abs(phase)], axis=1), np.tile([1.0, 0, 0, 0], (400, 1)))
-    shaky = shaken(truth, 5)
-    cleaned = clean(times, shaky)
-    hits = np.flatnonzero(np.abs(phase) < 1e-9)
-    assert len(hits) == 4
-    own = np.sqrt(np.mean(np.sum((shaky.positions - truth.positions)[hits] ** 2, axis=1)))
-    assert np.linalg.norm((cleaned.poses.positions - truth.positions)[hits], axis=1).max() < max(2.0 * own, 3.0 * NOISE)
-    assert not cleaned.spikes.any()
+    assert not lost or shell_error(cleaned.poses, truth)[rows].max() < 0.006
 
 
 @pytest.mark.parametrize(("shape", "late"), combined(("drum", "throw", "step"), (0.5, 0.0, 0.33)))
@@ -155,24 +130,6 @@ def test_a_hit_is_no_further_off_than_it_was_recorded_be_it_on_a_sample_or_betwe
         ratios.append(rms(cleaned[hits], truth[hits]) / rms(shaky[hits], truth[hits]))
     assert np.median(ratios) < 1.01
     assert max(ratios) < 1.2
-
-
-@settings(max_examples=tried(30), deadline=None)
-@given(st.integers(0, 10**6), st.floats(1e-5, 0.05), st.floats(0.01, 1.0), st.integers(8, 150))
-def test_nothing_is_moved_by_more_than_the_tolerance(seed, tolerance, radius, count):
-    random = np.random.default_rng(seed)
-    times = np.cumsum(random.uniform(0.001, 0.1, count))
-    walk = np.cumsum(random.normal(size=(count, 7)) * random.choice([0.0, 0.001, 0.1, 3.0], (count, 1)), axis=0)
-    poses = Poses(walk[:, :3], align_signs(normalise(walk[:, 3:] + random.normal(size=4))))
-    cleaned = clean(times, poses, tolerance, radius)
-    listed = cleaned.spikes | cleaned.repeats
-    # Independent check: the displacement of many points on the sphere.
-    points = random.normal(size=(400, 1, 3))
-    points *= radius / np.linalg.norm(points, axis=-1, keepdims=True)
-    apart = rotate(cleaned.poses.quaternions, points) + cleaned.poses.positions - rotate(poses.quaternions, points)
-    off = np.linalg.norm(apart - poses.positions, axis=-1).max(axis=0)
-    assert (off[~listed] <= tolerance * (1.0 + 1e-9)).all()
-    assert np.isfinite(cleaned.poses.positions).all()
 
 
 @pytest.mark.parametrize("seed", range(tried(12)))
@@ -256,23 +213,28 @@ def test_a_body_is_cleaned_joint_by_joint_and_bounded_in_the_world(tolerance):
 
 
 @settings(max_examples=tried(60), deadline=None)
-@given(st.integers(0, 10**6), st.none() | st.floats(1e-4, 0.1), st.integers(8, 200), st.integers(1, 6))
+@given(st.integers(0, 10**6), st.none() | st.floats(1e-5, 0.1), st.integers(8, 200), st.integers(1, 6))
 def test_what_stands_slides_no_further_than_it_did_and_nothing_is_moved_by_more(seed, tolerance, count, joints):
-    random = np.random.default_rng(seed)
+    random, radius = np.random.default_rng(seed), 10.0 ** -(seed % 3)
     times = np.cumsum(random.uniform(0.001, 0.1, count))
-    walk = np.cumsum(random.normal(size=(joints, count, 7)) * random.choice([0, 1e-3, 0.1], (joints, count, 1)), axis=1)
+    walk = np.cumsum(
+        random.normal(size=(joints, count, 7)) * random.choice([0, 1e-3, 0.1, 3], (joints, count, 1)), axis=1
+    )
     walk += random.choice([0, 1e-3, 1e-2]) * random.normal(size=walk.shape) + random.normal(size=(joints, 1, 7))
     poses = Poses(walk[..., :3], np.stack([align_signs(normalise(rows)) for rows in walk[..., 3:]]))
     stands = np.repeat(random.random((joints, count // 8 + 1)) < 0.5, 8, axis=1)[:, :count]
     skeleton = Skeleton(random_parents(random, joints))
-    cleaned = clean(times, poses, tolerance, 0.1, skeleton, stands=stands)
+    cleaned = clean(times, poses, tolerance, radius, skeleton, stands=stands)
     out = cleaned.spikes | cleaned.repeats
     for own in skeleton.levels[1:]:
         out[own] |= out[skeleton.parents[own]]
     assert np.array_equal(cleaned.stands, stands & ~out)
-    after, before = (skeleton.in_root_space(each).positions for each in (cleaned.poses, poses))
+    after, before = (in_root_space(each, skeleton.parents) for each in (cleaned.poses, poses))
+    moved = largest_displacements(after, before, radius)
+    np.testing.assert_allclose(cleaned.moved, moved, rtol=1e-6, atol=1e-9)
+    assert tolerance is None or moved[~out].max(initial=0.0) <= tolerance * (1.0 + 1e-9)
+    after, before = (each[..., :3, 3] for each in (after, before))
     assert slide_ratios(after, before, cleaned.stands, 0.25 * (tolerance or 0.0)).max() <= 1.0 + 1e-9
-    assert tolerance is None or cleaned.moved[~out].max(initial=0.0) <= tolerance * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -6,7 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rigid_motion.motion import Poses, Skeleton
-from rigid_motion.motion.poses import inverse, placed
+from rigid_motion.motion.poses import inverse
 from rigid_motion.motion.skeletons import AT_ONCE
 from tests.motion.bodies import in_root_space, matrices, random_parents
 from tests.motion.cases import random_quaternions
@@ -67,13 +67,6 @@ def test_depths_levels_and_what_hangs_below_are_those_of_the_chains(joints, seed
 def test_parents_that_are_none_are_named(parents, message):
     with pytest.raises(ValueError, match=message):
         Skeleton(parents)
-
-
-@pytest.mark.parametrize("above_scaled", [False, True])
-@pytest.mark.parametrize("scaled", [False, True])
-def test_a_pose_in_the_space_of_another_is_the_product_of_matrices(above_scaled, scaled):
-    above, poses = some_poses(3, 40, scaled=above_scaled), some_poses(4, 40, scaled=scaled)
-    assert np.abs(matrices(placed(above, poses)) - matrices(above) @ matrices(poses)).max() < 1e-13
 
 
 @pytest.mark.parametrize("scaled", [False, True])
