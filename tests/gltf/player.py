@@ -147,17 +147,7 @@ class File:
 
     def worlds(self, clip: int | str, times: np.ndarray) -> np.ndarray:
         """Return the world matrices of all nodes, shape (nodes, times, 4, 4)."""
-        nodes, tracks = self.json["nodes"], self.tracks(clip)
-        parents = {child: number for number, node in enumerate(nodes) for child in node.get("children", [])}
-        result: dict[int, np.ndarray] = {}
-
-        def world(node: int) -> np.ndarray:
-            if node not in result:
-                local = _local(nodes[node], node, tracks, times)
-                result[node] = world(parents[node]) @ local if node in parents else local
-            return result[node]
-
-        return np.array([world(node) for node in range(len(nodes))])
+        return worlds(self.json["nodes"], self.tracks(clip), times)
 
     def seen_nodes(self) -> list[int]:
         """Return the nodes in scenes; all nodes if there are no scenes."""
@@ -248,6 +238,20 @@ class File:
         count = len(next(iter(given.values())))
         named = [(name, given.get(name.upper(), np.tile(rest, (count, 1)))) for name, rest in REST.items()]
         return np.concatenate([_applied(world @ own, places) for own in composed(**dict(named))], axis=1)
+
+
+def worlds(nodes: list[dict[str, Any]], tracks: dict[tuple[int, str], Track], times: np.ndarray) -> np.ndarray:
+    """Return the world matrices of nodes that tracks move, shape (nodes, times, 4, 4)."""
+    parents = {child: number for number, node in enumerate(nodes) for child in node.get("children", [])}
+    result: dict[int, np.ndarray] = {}
+
+    def world(node: int) -> np.ndarray:
+        if node not in result:
+            local = _local(nodes[node], node, tracks, times)
+            result[node] = world(parents[node]) @ local if node in parents else local
+        return result[node]
+
+    return np.array([world(node) for node in range(len(nodes))])
 
 
 def moments(*files: File, clip: int | str) -> np.ndarray:

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tests.gltf.making import Making
-from tests.gltf.player import INSTANCES, composed
+from tests.gltf.player import INSTANCES, composed, worlds
 
 TREES = ("alone", "chain", "branches", "one place", "deep")
 
@@ -157,26 +157,6 @@ class _File:
         values = self.random.normal(size=(*count, 4))
         return values / np.linalg.norm(values, axis=-1, keepdims=True)
 
-    def _worlds(self) -> np.ndarray:
-        """Return the rest matrices of the joints."""
-        result = np.tile(np.eye(4), (len(self.nodes), 1, 1))
-        waiting = [(0, np.eye(4))]
-        while waiting:
-            number, above = waiting.pop()
-            node = self.nodes[number]
-            local = (
-                np.reshape(node["matrix"], (4, 4)).T
-                if "matrix" in node
-                else composed(
-                    np.array([node.get("translation", [0.0] * 3)]),
-                    np.array([node.get("rotation", [0.0, 0.0, 0.0, 1.0])]),
-                    np.array([node.get("scale", [1.0, 1.0, 1.0])]),
-                )[0]
-            )
-            result[number] = above @ local
-            waiting += [(child, result[number]) for child in node.get("children", [])]
-        return result
-
     # Meshes
 
     def _add_geometry(self, kind: str) -> None:
@@ -245,17 +225,17 @@ class _File:
 
     def _skinned(self, primitive: dict[str, Any], far: float) -> None:
         random, count, joints = self.random, 8, self.joints
-        worlds = self._worlds()[:joints]
+        at_rest = worlds(self.nodes, {}, np.zeros(1))[:joints, 0]
         carriers = min(joints, 4)
         joint_numbers = np.zeros((count, 4), "u1" if random.random() < 0.5 else "<u2")
         joint_numbers[:, :carriers] = [random.permutation(joints)[:carriers] for _ in range(count)]
         shares = random.uniform(size=(count, 4)) ** 3 * (np.arange(4) < carriers)
         shares /= shares.sum(axis=1, keepdims=True)
-        places = worlds[joint_numbers[:, 0], :3, 3] + 0.3 * far * self.unit * random.normal(size=(count, 3))
+        places = at_rest[joint_numbers[:, 0], :3, 3] + 0.3 * far * self.unit * random.normal(size=(count, 3))
         inverse = np.array(
             [
                 np.linalg.inv(world) if abs(np.linalg.det(world)) > 1e-12 else composed(*[[part] for part in still])[0]
-                for world in worlds
+                for world in at_rest
                 for still in [(-world[:3, 3], [0.0, 0.0, 0.0, 1.0], [1.0, 1.0, 1.0])]
             ]
         )

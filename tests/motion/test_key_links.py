@@ -1,10 +1,10 @@
-"""Tests of the shortest path from key to key against an exhaustive search."""
+"""Tests of the shortest path from key to key against an exhaustive search, and of its fast errors of splines."""
 
 import numpy as np
 import pytest
 
-from rigid_motion.motion import MODES, Poses, reduce_keys, twists
-from rigid_motion.motion.key_costs import SampleTracks
+from rigid_motion.motion import MODES, Poses, key_splines, reduce_keys, twists
+from rigid_motion.motion.key_costs import Costs, SampleTracks
 from rigid_motion.motion.key_search import KeySearch
 from rigid_motion.motion.key_splines import SplineErrors
 from rigid_motion.motion.quaternions import align_signs
@@ -69,3 +69,22 @@ def test_long_segments_of_a_smooth_motion_do_not_make_the_search_many_times_as_l
         KeySearch(SampleTracks(times, poses, "motor_spline", RADIUS, 0.9)).within(tries)
         efforts.append(sum(looked_at))
     assert efforts[1] <= 6 * efforts[0]
+
+
+def errors_of(times: np.ndarray, poses: Poses, keys: np.ndarray) -> np.ndarray:
+    costs = Costs(SampleTracks(times, poses, "motor_spline", RADIUS), 8)
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(keys, 1, constant_values=-1), 4)
+    return costs.errors(windows)
+
+
+@pytest.mark.parametrize("remembered", [key_splines.REMEMBERED_EACH, 0])
+@pytest.mark.parametrize("seed", range(2))
+def test_errors_are_those_of_the_mode(seed, remembered, monkeypatch):
+    monkeypatch.setattr(key_splines, "REMEMBERED_EACH", remembered)
+    times, poses = wandering(400, seed, 1e-4 * (seed % 2))
+    random = np.random.default_rng(seed)
+    for count in (2, 3, 5, 20, 100):
+        keys = np.sort(random.choice(np.arange(1, 399), count - 2, replace=False))
+        keys = np.concatenate(((0,), keys, (399,)))
+        errors = errors_of(times, poses, keys)
+        assert np.allclose(errors, shell_errors(times, poses, keys, "motor_spline"), rtol=1e-9, atol=1e-9)
