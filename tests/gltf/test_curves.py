@@ -7,7 +7,7 @@ import pytest
 
 from rigid_motion.gltf import Options, Report, curves, reduce_file
 from tests.gltf.making import Making, turns, walk
-from tests.gltf.player import File, off
+from tests.gltf.player import File, off, shown
 
 RADIUS, TOLERANCE = 0.03, 1e-3
 
@@ -43,22 +43,15 @@ def hand_made(joints: int = 8, seed: int = 0) -> tuple[Making, dict[int, np.ndar
     times, own = made.times(np.arange(LAST + 1) / RATE), {}
     for joint in range(joints):
         inner = 8 * random.choice(np.arange(1, LAST // 8), random.integers(4, 8), replace=False)
-        own[joint] = np.unique(np.concatenate(((0, LAST), inner + random.integers(-2, 3, len(inner)))))
+        own[joint] = np.unique(np.concatenate(((0.0, LAST), inner + random.integers(-2, 3, len(inner)))))
         keys = np.column_stack((np.ones(len(own[joint])), 0.2 * random.normal(size=(len(own[joint]), 3))))
         keys /= np.linalg.norm(keys, axis=1, keepdims=True)
         slopes = np.gradient(keys, own[joint], axis=0)
-        values = _hermite(own[joint], keys, slopes, np.arange(LAST + 1))
+        rows = np.stack((slopes, keys, slopes), axis=1).reshape(-1, 4)
+        values = shown("CUBICSPLINE", own[joint], rows, np.arange(LAST + 1), turns=False)
         values /= np.linalg.norm(values, axis=1, keepdims=True)
         made.channel(joint, "rotation", times, values[:, [1, 2, 3, 0]])
     return made, own
-
-
-def _hermite(frames: np.ndarray, keys: np.ndarray, slopes: np.ndarray, at: np.ndarray) -> np.ndarray:
-    first = np.clip(np.searchsorted(frames, at, side="right") - 1, 0, len(frames) - 2)
-    length = np.diff(frames)[first, None]
-    s = (at - frames[first])[:, None] / length
-    result = (1 + 2 * s) * (1 - s) ** 2 * keys[first] + s * (1 - s) ** 2 * length * slopes[first]
-    return result + s**2 * (3 - 2 * s) * keys[first + 1] + s**2 * (s - 1) * length * slopes[first + 1]
 
 
 @pytest.mark.parametrize("seed", [0, 1])

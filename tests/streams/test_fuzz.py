@@ -118,15 +118,6 @@ def test_flipped_bits_from_the_sender_itself_do_no_lasting_harm(genuine: list[by
     assert receiver.show(times[-1])
 
 
-def test_a_sender_far_in_the_past_or_future_is_shown() -> None:
-    own, receiver = body(), Receiver()
-    for seconds in (-1e11, 1e11):
-        sender = Sender([own])
-        for datagram in [*sender.add(seconds, own.rest), *sender.add(seconds + 0.1, own.rest), *sender.finish()]:
-            receiver.take(datagram, 0.0, seconds)
-        assert receiver.show(0.2)
-
-
 WRONG = (None, True, 1.5, -1, 0, 10**400, -(10**30), "", "x", [], [[]], {}, {"a": 1}, float("nan"), float("inf"))
 """Values that replace parts of a description."""
 

@@ -10,7 +10,7 @@ import pytest
 from pythonosc.osc_bundle import OscBundle
 
 from rigid_motion.live.driving import Retargeting, matched
-from rigid_motion.motion import Poses, Skeleton, shell_error
+from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.motion.humanoid import HUMANOID, humanoid_bones
 from rigid_motion.motion.quaternions import multiply
 from rigid_motion.streams import Receiver, StreamBody, osc
@@ -119,22 +119,6 @@ def test_without_times_a_bone_that_comes_again_begins_a_frame():
     (keys,) = receiver.keys()
     assert keys.moments == pytest.approx([0.0, 0.1, 0.2])
     assert keys.poses["VMC"].positions[1, :, 1] == pytest.approx([0.0, -1.0, -2.0])
-
-
-def test_what_is_written_is_what_is_shown():
-    receiver = Receiver(delay=0.05)
-    for row in range(20):
-        heard(write(row / 60, frame(row)), 5.0 + row / 60, receiver)
-    (keys,) = receiver.keys()
-    assert keys.moments == pytest.approx(np.arange(20) / 60, abs=1e-6)
-    body = keys.bodies[0]
-    for joint, name in enumerate(body.joints[1:], 1):
-        frames = [frame(row)[name] for row in range(20)]
-        sent = Poses([one.positions for one in frames], [one.quaternions for one in frames])
-        assert shell_error(sent, keys.poses["VMC"][joint], 0.1).max() < 1e-6
-    shown = receiver.show(5.0 + 19 / 60)[keys.stream]
-    assert shown.moment == pytest.approx(19 / 60 - 0.05, abs=1e-6)
-    assert receiver.show(30.0) == {}
 
 
 TRACKER = b"/VMC/Ext/Tra/Pos\0\0\0\0,sfffffff\0\0\0LHR-1\0\0\0" + POSE_7
