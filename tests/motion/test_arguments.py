@@ -88,20 +88,6 @@ def test_what_is_no_poses_is_refused_by_name(use, name, given):
         use(given)
 
 
-@pytest.mark.parametrize(
-    "use",
-    [
-        lambda times: decimate(times, 5.0).tolist(),
-        lambda times: fit_keys(times, POSES, KEYS).positions.tolist(),
-        lambda times: measure(times, POSES, POSES).velocity.tolist(),
-        lambda times: repair(times, POSES)[0].tolist(),
-        lambda times: standing(times, POSES.positions[None].tolist()).tolist(),
-    ],
-)
-def test_times_may_be_a_list(use):
-    assert use(TIMES.tolist()) == use(TIMES)
-
-
 def reduced(**options):
     return reduce_keys(TIMES, POSES, **{"tolerance": 0.1, **options})
 
@@ -196,6 +182,10 @@ WITH_NUMBERS = [
     ("times", lambda rows: interpolate(TIMES, POSES, rows)),
     ("times", lambda rows: reduce_skeleton_keys(rows, BODY, [-1, 0], tolerance=0.1)),
     ("times", lambda rows: repair(rows, POSES)),
+    ("times", lambda rows: fit_keys(rows, POSES, KEYS)),
+    ("times", lambda rows: measure(rows, POSES, POSES)),
+    ("times", lambda rows: standing(rows, POSES.positions[None])),
+    ("positions", lambda rows: standing(TIMES, rows)),
     ("key times", lambda rows: interpolate(rows, POSES, TIMES)),
     ("key times", lambda rows: prepare(rows, POSES)),
     ("progress", lambda rows: in_betweens([0.0, 1.0], POSES[:2], [12], rows)),

@@ -22,12 +22,15 @@ def stepping(stands: np.ndarray, drift: float = 0.0) -> np.ndarray:
     return np.stack((np.cumsum(ways), 0.0 * ways, np.full(len(ways), HEIGHTS[2])), axis=1)
 
 
-def test_a_foot_that_stops_stands_and_nothing_else_does():
+@pytest.mark.parametrize(("noise", "share"), [(0.0, 0.9), (0.003, 0.7)])
+def test_a_foot_that_stops_stands_if_it_jitters_too_and_nothing_else_does(noise, share):
     stops = (TIMES > 0.5) & (TIMES < 1.5)
-    stands = standing(TIMES, body(stepping(stops)))
+    positions = body(stepping(stops)) + noise * np.random.default_rng(1).normal(size=(3, 90, 3))
+    assert standing(TIMES, positions).any() == (noise == 0.0)
+    stands = standing(TIMES, positions, shaky=noise > 0.0)
     assert not stands[:2].any()
     assert np.all(stands[2] <= stops)
-    assert np.count_nonzero(stands[2]) >= np.count_nonzero(stops) - 2
+    assert np.count_nonzero(stands[2]) > share * np.count_nonzero(stops)
 
 
 @pytest.mark.parametrize(("drift", "does"), [(0.05, True), (0.2, False)])
@@ -57,16 +60,6 @@ def test_the_slide_is_the_farthest_from_where_it_stood_at_first():
     stands[2, 40:71] = True
     assert slide(positions, stands) == pytest.approx(0.03)
     assert slide(positions, np.zeros_like(stands)) == 0.0
-
-
-def test_a_foot_that_jitters_stands_as_long():
-    stops = (TIMES > 0.5) & (TIMES < 1.5)
-    shaky = body(stepping(stops)) + 0.003 * np.random.default_rng(1).normal(size=(3, 90, 3))
-    assert not standing(TIMES, shaky).any()
-    stands = standing(TIMES, shaky, shaky=True)
-    assert not stands[:2].any()
-    assert np.all(stands[2] <= stops)
-    assert np.count_nonzero(stands[2]) > 0.7 * np.count_nonzero(stops)
 
 
 def test_how_far_it_slides_is_told_of_each_contact_by_what_it_did_there():

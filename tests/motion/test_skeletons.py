@@ -30,27 +30,6 @@ def test_joints_get_where_matrices_take_them(joints, seed, scaled, count):
     assert np.abs(there - expected).max() <= 1e-13 * max(1.0, np.abs(expected).max())
 
 
-@settings(max_examples=tried(60))
-@given(st.integers(1, 14), st.integers(0, 2**16))
-def test_depths_levels_and_what_hangs_below_are_those_of_the_chains(joints, seed):
-    parents = random_parents(np.random.default_rng(seed), joints)
-    chains = []
-    for joint in range(joints):
-        chain = [joint]
-        while parents[chain[-1]] >= 0:
-            chain.append(int(parents[chain[-1]]))
-        chains.append(chain)
-    skeleton = Skeleton(parents)
-    assert len(skeleton) == joints
-    assert skeleton.depths.tolist() == [len(chain) - 1 for chain in chains]
-    assert [skeleton.below(joint).tolist() for joint in range(joints)] == [
-        [other for other in range(joints) if joint in chains[other]] for joint in range(joints)
-    ]
-    assert np.concatenate(skeleton.levels).size == joints
-    for depth, level in enumerate(skeleton.levels):
-        assert np.all(skeleton.depths[level] == depth)
-
-
 @pytest.mark.parametrize(
     ("parents", "message"),
     [
