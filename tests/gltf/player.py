@@ -268,9 +268,9 @@ def eighths(keys: np.ndarray) -> np.ndarray:
     return np.unique(np.append(between, keys[-1]))
 
 
-def off(before: File, after: File, clip: int | str, radius: float = 0.0) -> Off:
-    """Return the largest displacement at `moments`; with a radius also of points around each node."""
-    times = moments(before, after, clip=clip)
+def off(before: File, after: File, clip: int | str, radius: float = 0.0, times: np.ndarray | None = None) -> Off:
+    """Return the largest displacement at times or at `moments`; with a radius also of points around each node."""
+    times = moments(before, after, clip=clip) if times is None else times
     around = before.around(clip, radius) if radius else None
     count = sum(map(np.size, before.points(clip, times[:1], around).values()))
     largest = Off(0.0, "nothing", float(times[0]))

@@ -28,10 +28,7 @@ def reduced(
 
 def error_at_frames(before: File, after: File) -> float:
     """Return the largest displacement of any point around any node at the keys of the file, computed from matrices."""
-    times = before.moments(0)
-    around = before.around(0, RADIUS)
-    truth, result = (file.points(0, times, around) for file in (before, after))
-    return max(float(np.linalg.norm(result[what] - places, axis=-1).max()) for what, places in truth.items())
+    return off(before, after, 0, RADIUS, before.moments(0)).error
 
 
 def hand_made(joints: int = 8, seed: int = 0) -> tuple[Making, dict[int, np.ndarray]]:

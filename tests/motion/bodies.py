@@ -4,6 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import Poses, interpolate, twists
+from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import align_signs, normalise
 from tests import balls
 
@@ -93,7 +94,5 @@ def body_errors(
     times: np.ndarray, poses: Poses, parents: np.ndarray, keys: tuple[np.ndarray, ...], mode: str, radii: np.ndarray
 ) -> np.ndarray:
     """Return the errors of a body between keys of its joints, shape (joints, n)."""
-    shown = [interpolate(times[own], poses[joint][own], times, mode) for joint, own in enumerate(keys)]
-    scales = None if poses.scales is None else [joint.scales for joint in shown]
-    shown = Poses([joint.positions for joint in shown], [joint.quaternions for joint in shown], scales)
+    shown = joined([interpolate(times[own], poses[[joint]][:, own], times, mode) for joint, own in enumerate(keys)])
     return largest_displacements(in_root_space(shown, parents), in_root_space(poses, parents), radii)

@@ -3,15 +3,14 @@
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion.motion.quaternions import align_signs, multiply
+from rigid_motion.motion.quaternions import align_signs, multiply, normalise
 
 PAIRS = 2000
 
 
 def random_quaternions(random: np.random.Generator, *shape: int) -> np.ndarray:
     """Return uniformly distributed rotations, shape (*shape, 4)."""
-    quaternions = random.normal(size=(*shape, 4))
-    return quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    return normalise(random.normal(size=(*shape, 4)))
 
 
 def pair(angle: np.ndarray | float, size: float = 1.0, scaled: bool = False, seed: int = 0) -> tuple[Poses, Poses]:
@@ -46,15 +45,6 @@ def corners(scaled: bool = False) -> dict[str, tuple[Poses, Poses]]:
 def size_of(*poses: Poses) -> float:
     """Return the largest coordinate, at least 1: the scale for the rounding of positions."""
     return max(1.0, *(float(np.abs(p.positions).max()) for p in poses))
-
-
-def as_keys(first: Poses, second: Poses) -> Poses:
-    """Return pairs as objects with two keys each, shape (pairs, 2)."""
-    return Poses(
-        np.stack((first.positions, second.positions), axis=1),
-        np.stack((first.quaternions, second.quaternions), axis=1),
-        None if first.scales is None else np.stack((first.scales, second.scales), axis=1),
-    )
 
 
 def shares() -> np.ndarray:

@@ -11,7 +11,8 @@ from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternio
 from scipy.spatial.transform import Rotation, Slerp
 
 from rigid_motion.motion import MODES, Poses, interpolate
-from tests.motion.cases import PAIRS, as_keys, assert_same, corners, shares, size_of
+from rigid_motion.motion.poses import joined
+from tests.motion.cases import PAIRS, assert_same, corners, shares, size_of
 
 CORNERS = list(corners())
 SCREWS = ["dq_sclerp", "pga_slerp", "cga_slerp"]
@@ -20,7 +21,8 @@ BLENDS = ["pga_lerp", "cga_lerp"]
 
 def between(mode: str, first: Poses, second: Poses, u: np.ndarray) -> Poses:
     """Return the in-betweens of the pairs, by the fast form that users run or the reference in the mode's algebra."""
-    return interpolate([0.0, 1.0], as_keys(first, second), u[:, None], mode)[:, 0]
+    keys = joined((first[:, None], second[:, None]), axis=1)
+    return interpolate([0.0, 1.0], keys, u[:, None], mode)[:, 0]
 
 
 in_each_corner = pytest.mark.parametrize("corner", CORNERS)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm, logm
 
 from rigid_motion.motion import MODES, Poses, in_betweens, interpolate, twists
+from rigid_motion.motion.poses import placed
 from rigid_motion.motion.quaternions import angle_between, multiply, rotate, turned
 from tests.motion.bodies import matrices
 from tests.motion.cases import assert_same, random_quaternions
@@ -159,14 +160,6 @@ def filled(times: np.ndarray, keys: Poses, mode: str, count: int = 100) -> Poses
     return Poses(path.positions.reshape(*shape, 3), path.quaternions.reshape(*shape, 4))
 
 
-def reseated(poses: Poses, on: Poses) -> Poses:
-    """Return the poses of another frame fixed to the same body, whose pose in the body is `on`."""
-    moved = rotate(poses.quaternions, np.broadcast_to(on.positions, poses.positions.shape))
-    return Poses(
-        poses.positions + moved, multiply(poses.quaternions, np.broadcast_to(on.quaternions, poses.quaternions.shape))
-    )
-
-
 def turnings(path: Poses) -> np.ndarray:
     """Return how far the body turns in each segment, in radians."""
     return angle_between(path.quaternions[:, 1:], path.quaternions[:, :-1]).sum(axis=-1)
@@ -198,8 +191,8 @@ def test_whatever_the_keys_a_stream_stays_in_their_neighbourhood(times, seed, sp
 def test_whatever_the_keys_no_point_of_the_body_leaves_their_neighbourhood(times, seed, spread):
     """The bounds of docs/conventions.md hold for steps of any size, up to 10 000 times as large as their neighbours."""
     random, (angles, keys) = np.random.default_rng(seed), wild_keys(times, seed, spread)
-    body = Poses(random.normal(size=3), random_quaternions(random))
-    for seated in (keys, reseated(keys, body)):
+    frame = Poses(random.normal(size=(1, 3)), random_quaternions(random, 1))
+    for seated in (keys, placed(keys, frame[[0] * len(times)])):
         path, screw = (filled(times, seated, mode) for mode in ("motor_spline", "dq_sclerp"))
         for amounts, away in (
             (lengths(screw), np.linalg.norm(path.positions - screw.positions, axis=-1)),
