@@ -28,6 +28,9 @@ def body(joints: int = 5, radius: float = 0.03) -> StreamBody:
     return StreamBody("performer", tuple(f"joint {joint}" for joint in range(joints)), parents, rest, radius)
 
 
+BODY = body()
+
+
 def dance(own: StreamBody, seconds: float = 6.0, rate: float = 60.0, speed: float = 1.0, seed: int = 1) -> tuple:
     """Return moments (n,) and poses (joints, n) of smooth motion."""
     rng = np.random.default_rng(seed)
@@ -175,6 +178,11 @@ def run(
         outcome.now = np.array(moments)
         compare(outcome, Forest(bodies), KnotPath(times, poses), lag)
     return outcome
+
+
+def danced(seconds: float, rate: float = 60.0, **conditions: object) -> Outcome:
+    """Play the dance of a body, sampled at a rate, under the conditions of `run`."""
+    return run([BODY], *dance(BODY, seconds, rate), **conditions)
 
 
 def compare(outcome: Outcome, forest: Forest, truth: KnotPath, lag: float | None) -> None:

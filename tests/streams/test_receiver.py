@@ -11,15 +11,14 @@ from rigid_motion.streams import Receiver, Sender, StreamBody
 from rigid_motion.streams.playing import MOST_JOINT_KNOTS
 from tests.thoroughness import combined, tried
 
-from .links import body, dance, run, talk
+from .links import BODY, body, dance, danced, run, talk
 
 TOLERANCE = 0.0051
 
 
 @pytest.mark.parametrize(("joins", "answers"), combined(np.arange(0.3, 2.5, 0.37).round(2), [True, False]))
 def test_somebody_who_joins_is_soon_shown_the_motion(joins: float, answers: bool) -> None:
-    own = body()
-    outcome = run([own], *dance(own, joins + 2.0), heard_from=joins, answers=answers)
+    outcome = danced(joins + 2.0, heard_from=joins, answers=answers)
     # Unheard within a refresh, and from its first knot on the delay.
     assert outcome.now[0] < joins + (0.3 if answers else 1.0 + 0.02 + 0.1)
     assert outcome.errors.max() <= TOLERANCE
@@ -27,8 +26,8 @@ def test_somebody_who_joins_is_soon_shown_the_motion(joins: float, answers: bool
 
 @pytest.mark.parametrize(("latencies", "answers"), combined([(0.05, 0.35), (0.35, 0.05), (0.02, 0.08)], [True, False]))
 def test_latency_that_changes_for_good(latencies: tuple[float, float], answers: bool) -> None:
-    own, (before, after) = body(), latencies
-    outcome = run([own], *dance(own, 6.0), latency=lambda now: before if now < 3.0 else after, answers=answers)
+    before, after = latencies
+    outcome = danced(6.0, latency=lambda now: before if now < 3.0 else after, answers=answers)
     changed = 3.0 + max(before, after)
     assert outcome.between(0.0, 3.0).max() <= TOLERANCE
     assert outcome.between(changed + 1.0, 6.0).max() <= TOLERANCE
@@ -49,21 +48,19 @@ def test_latency_that_changes_for_good(latencies: tuple[float, float], answers: 
     ],
 )
 def test_a_clock_that_steps_is_no_motion(whose: str, step: float) -> None:
-    own = body()
     if whose == "the receiver's":
-        outcome = run([own], *dance(own, 4.0), clock=lambda now: now + 1000.0 + step * (now > 2.004))
+        outcome = danced(4.0, clock=lambda now: now + 1000.0 + step * (now > 2.004))
         assert (outcome.now - outcome.moments)[outcome.now > 3.0].max() < 0.13
     else:
         heard = whose == "the sender's"
-        outcome = run([own], *dance(own, 4.0), set_by=lambda now: step * (now > 2.008), answers=heard)
+        outcome = danced(4.0, set_by=lambda now: step * (now > 2.008), answers=heard)
     assert outcome.errors.max() <= TOLERANCE
     assert np.diff(outcome.moments).min() >= 0.0
 
 
 @pytest.mark.parametrize(("step", "answers"), combined([0.3, 0.5, 0.9, -0.5], [True, False]))
 def test_a_sender_s_clock_that_is_set_by_less_than_a_second_is_soon_known(step: float, answers: bool) -> None:
-    own = body()
-    outcome = run([own], *dance(own, 4.0), set_by=lambda now: step * (now > 2.008), answers=answers, lag=0.12)
+    outcome = danced(4.0, set_by=lambda now: step * (now > 2.008), answers=answers, lag=0.12)
     # A picture or two may be off by what the motion does between two samples.
     off = outcome.between(1.0, 4.0)
     assert np.count_nonzero(off > 4.0 * TOLERANCE) <= 2
@@ -73,12 +70,11 @@ def test_a_sender_s_clock_that_is_set_by_less_than_a_second_is_soon_known(step: 
 
 @pytest.mark.parametrize(("bursts", "answers"), combined([0.1, 0.25], [True, False]))
 def test_a_receiver_with_a_busy_processor(bursts: float, answers: bool) -> None:
-    own = body()
 
     def drained(now: float) -> float:
         return np.ceil(now / bursts) * bursts if now > 3.0 else now
 
-    outcome = run([own], *dance(own, 8.0), drained=drained, answers=answers)
+    outcome = danced(8.0, drained=drained, answers=answers)
     assert outcome.between(0.0, 3.0).max() <= TOLERANCE
     adapted = outcome.between(4.0 + bursts, 8.0)
     # A datagram may still have waited longer than all before.
@@ -108,8 +104,8 @@ def test_a_datagram_that_is_lost_costs_no_later_one_its_meaning(number: int, ans
 )
 def test_a_long_way_with_jitter_loss_and_duplicates(limits: tuple[float, float], answers: bool) -> None:
     loss, within = limits
-    own, copies = body(), 1 + (loss > 0.0)
-    outcome = run([own], *dance(own, 8.0), loss=loss, latency=0.21, jitter=0.08, copies=copies, answers=answers)
+    copies = 1 + (loss > 0.0)
+    outcome = danced(8.0, loss=loss, latency=0.21, jitter=0.08, copies=copies, answers=answers)
     assert np.mean(outcome.between(2.0, 8.0) <= 0.02) >= within
     # No freeze, and no jump back.
     assert np.diff(outcome.moments).min() > 0.0
@@ -126,10 +122,7 @@ def test_where_datagrams_are_lost_no_hand_goes_back_against_its_motion(loss: flo
 
 @pytest.mark.parametrize(("loss", "answers"), combined([0.0, 0.01], [True, False]))
 def test_an_outage_of_2_s_heals_within_half_a_second(loss: float, answers: bool) -> None:
-    own = body()
-    outcome = run(
-        [own], *dance(own, 7.0), loss=loss, lost=lambda now, count: 2.0 <= now < 4.0, latency=0.03, answers=answers
-    )
+    outcome = danced(7.0, loss=loss, lost=lambda now, count: 2.0 <= now < 4.0, latency=0.03, answers=answers)
     there = np.concatenate((outcome.between(0.0, 2.0), outcome.between(4.5, 7.0)))
     assert np.mean(there <= 0.02) >= 0.98
     assert outcome.between(4.5, 5.0).max() <= (TOLERANCE if not loss else 0.02)
@@ -150,10 +143,9 @@ def test_where_much_is_lost_everything_is_sent_twice() -> None:
 
 
 def test_a_sender_that_begins_again_is_told_by_its_identity_and_replays_of_the_one_before_change_nothing() -> None:
-    own = body()
-    times, poses = dance(own, 4.0)
+    times, poses = dance(BODY, 4.0)
     receiver, old = Receiver(), []
-    first, sender = Sender([own], rate=60.0), Sender([own], rate=60.0)
+    first, sender = Sender([BODY], rate=60.0), Sender([BODY], rate=60.0)
     for row, time in enumerate(times.tolist()):
         # The second sender begins with its own times.
         datagrams = first.add(time, poses[:, row]) if time < 2.0 else sender.add(time - 2.0, poses[:, row])

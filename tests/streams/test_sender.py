@@ -19,7 +19,7 @@ from rigid_motion.streams.sender import GRID_TICKS, MAX_SEQUENCE_NUMBER
 from rigid_motion.streams.wire import read
 from tests.thoroughness import combined, tried
 
-from .links import backs_of, body, dance, run
+from .links import BODY, backs_of, body, dance, danced, run
 
 SLACK = 1.02
 """Factor on the tolerance: it is guaranteed at samples, but both motions bend a little at the frames between them."""
@@ -28,8 +28,7 @@ SLACK = 1.02
 @pytest.mark.parametrize("delay", [0.1, 0.2])
 @pytest.mark.parametrize("rate", [30.0, 60.0, 90.5])
 def test_what_is_shown_is_within_the_tolerance(rate: float, delay: float) -> None:
-    own = body()
-    outcome = run([own], *dance(own, 4.0, rate), delay=delay)
+    outcome = danced(4.0, rate, delay=delay)
     assert outcome.errors.max() <= 0.005 * SLACK
     assert len(outcome.errors) > 350
 
@@ -79,12 +78,11 @@ def test_a_fast_hand_is_within_the_tolerance_between_samples(rate: float, uneven
 
 
 def test_a_sample_that_is_overdue_is_not_waited_for() -> None:
-    own = body()
-    times, poses = dance(own, 4.0, 90.0)
+    times, poses = dance(BODY, 4.0, 90.0)
     rng = np.random.default_rng(2)
     kept = np.cumsum(rng.integers(1, 7, len(times)))
     kept = kept[kept < len(times)]
-    outcome = run([own], times[kept], poses[:, kept])
+    outcome = run([BODY], times[kept], poses[:, kept])
     assert np.diff(times[kept]).max() > 0.06
     assert outcome.errors.max() <= 0.005 * SLACK
 
@@ -109,10 +107,9 @@ def test_samples_from_before_what_was_sent_without_them_are_said_all_the_same() 
 
 
 def test_a_body_at_rest_costs_keepalives() -> None:
-    own = body()
-    times, poses = dance(own, 10.0)
+    times, poses = dance(BODY, 10.0)
     still = poses[:, np.zeros(len(times), dtype=int)]
-    outcome = run([own], times, still)
+    outcome = run([BODY], times, still)
     late = [datagram for sent, datagram in outcome.datagrams if sent > 1.0]
     assert 9.0 / 0.5 - 2 <= len(late) <= 9.0 / 0.5 + 2
     assert np.ptp(outcome.errors[outcome.now > 5.0]) < 1e-4
@@ -120,20 +117,17 @@ def test_a_body_at_rest_costs_keepalives() -> None:
 
 
 def test_it_builds_on_what_is_acknowledged() -> None:
-    own = body()
-    samples = dance(own, 4.0)
-    with_answers, without = (run([own], *samples, answers=answers) for answers in (True, False))
+    with_answers, without = (danced(4.0, answers=answers) for answers in (True, False))
     assert set(backs_of(datagram for sent, datagram in with_answers.datagrams if sent > 0.5)) == {1}
     assert max(backs_of(datagram for _, datagram in without.datagrams)) > 1
     assert sum(len(d) for _, d in with_answers.datagrams) < 0.8 * sum(len(d) for _, d in without.datagrams)
 
 
 def test_finish_says_the_rest() -> None:
-    own = body()
-    times, poses = dance(own, 1.0)
+    times, poses = dance(BODY, 1.0)
     said = []
     for stop in range(40, 60):
-        sender = Sender([own], rate=60.0)
+        sender = Sender([BODY], rate=60.0)
         for row in range(stop):
             sender.add(float(times[row]), poses[:, row])
         said.append(len(sender.finish()))
