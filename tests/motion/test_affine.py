@@ -6,23 +6,10 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion.affine import AffineMaps, ball_displacement, displacement_over, largest_displacement
-from rigid_motion.motion.quaternions import matrices, normalise
+from rigid_motion.motion.quaternions import matrices
+from tests.motion.cases import random_quaternions
 
 COUNT = 200
-
-
-@pytest.fixture
-def pairs() -> tuple[AffineMaps, AffineMaps, np.ndarray]:
-    """Return pairs of maps of balls: all turned about their origins, half of them also moved, stretched and sheared."""
-    random = np.random.default_rng(3)
-    turned = [np.moveaxis(matrices(normalise(random.normal(size=(COUNT, 4)))), -1, 0) for _ in range(2)]
-    shear, moved = random.normal(size=(COUNT, 3, 3)), random.normal(size=(COUNT, 3))
-    moved[::2], shear[::2] = 0.0, np.eye(3)
-    return (
-        AffineMaps(turned[0] @ shear, moved),
-        AffineMaps(turned[1], np.zeros((COUNT, 3))),
-        random.uniform(0, 1, COUNT),
-    )
 
 
 @pytest.mark.parametrize("size", [1.9007093261133585, 0.7157361225108096, 1.3149344159092364])
@@ -31,8 +18,14 @@ def test_a_ball_of_which_the_square_is_rounded_otherwise_alone_is_off_as_far_as_
     assert float(ball_displacement(shrunk, whole, size)) == pytest.approx(size)
 
 
-def test_the_largest_and_those_over_a_limit_are_found_by_bounds(pairs):
-    maps, truth, radii = pairs
+def test_the_largest_and_those_over_a_limit_are_found_by_bounds():
+    """Of maps of balls that are all turned about their origins, and half of them also moved, stretched and sheared."""
+    random = np.random.default_rng(3)
+    turned = [np.moveaxis(matrices(random_quaternions(random, COUNT)), -1, 0) for _ in range(2)]
+    shear, moved = random.normal(size=(COUNT, 3, 3)), random.normal(size=(COUNT, 3))
+    moved[::2], shear[::2] = 0.0, np.eye(3)
+    maps, truth = AffineMaps(turned[0] @ shear, moved), AffineMaps(turned[1], np.zeros((COUNT, 3)))
+    radii = random.uniform(0, 1, COUNT)
     every = ball_displacement(maps, truth, radii)
     assert largest_displacement(maps, truth, radii) == every.max()
     limit = float(np.median(every))
