@@ -12,10 +12,9 @@ import pytest
 
 from rigid_motion.gltf import GltfError, Options, documents, read_document, reduce_file, reduced, tracks
 from rigid_motion.gltf.nodes import Nodes
-from rigid_motion.gltf.tracks import read_clips
 from rigid_motion_batch.cli import reduce
 from tests.gltf.making import glb, walk
-from tests.gltf.player import File, shown
+from tests.gltf.player import File
 from tests.thoroughness import tried
 
 RESULT = "walk-reduced"
@@ -121,18 +120,6 @@ def test_channels_that_share_numbers_without_end_are_refused(tmp_path, capsys, m
 def test_whole_numbers_may_be_longer_than_those_of_computers(tmp_path):
     document = read_document(changed(tmp_path / "walk.glb", put("nodes", 0, "translation", to=[10**29, 0.5, 0])))
     assert Nodes(document).rest["translation"][0].tolist() == [1e29, 0.5, 0.0]
-
-
-def test_two_keys_at_one_time_are_a_cut(tmp_path):
-    made, path = walk(2), tmp_path / "cut.glb"
-    times = np.array([0.0, 1.0, 1.0, 2.0], dtype="<f4")
-    made.channel(1, "translation", made.times(times), np.eye(4, 3)[[0, 0, 1, 1]])
-    track = read_clips(read_document(made.write(path)))[0].tracks[-1]
-    assert track.at(np.array([0.999, 1.0])).tolist() == np.eye(3)[:2].tolist()
-    assert np.array_equal(track.times.astype("<f4"), [0.0, np.nextafter(times[1], np.float32(0.0)), 1.0, 2.0])
-    reduce_file(path, tmp_path / "made.glb", Options(1e-3))
-    after = File(tmp_path / "made.glb").tracks(0)[1, "translation"]
-    assert shown(*after, np.array([0.999, 1.0]), turns=False) == pytest.approx(np.eye(3)[:2], abs=1e-3)
 
 
 def test_chunks_that_lie_are_refused(tmp_path, capsys):
