@@ -1,6 +1,5 @@
 """Files compressed by meshopt are read, reduced and compressed again; other files are compressed on request."""
 
-import base64
 import json
 from pathlib import Path
 
@@ -10,12 +9,12 @@ import pytest
 from rigid_motion.gltf import Options, read_document, reduce_file, reduced
 from rigid_motion.gltf.accessors import numbers
 from rigid_motion.gltf.attribute_streams import encoded
-from rigid_motion.gltf.documents import Document, GltfError
+from rigid_motion.gltf.documents import Document, GltfError, data_uri
 from rigid_motion.gltf.meshopt import Streams, decompressed, packed
 from rigid_motion.gltf.tracks import read_clips
 from rigid_motion_batch.cli import reduce
 from rigid_motion_batch.recordings import read_trajectories
-from tests.gltf.making import Making, turns, walk
+from tests.gltf.making import turns, walk
 from tests.gltf.player import File, off
 
 EXT, KHR = "EXT_meshopt_compression", "KHR_meshopt_compression"
@@ -30,28 +29,9 @@ def document(data: bytes, count: int, stride: int, **more: object) -> Document:
     return Document({"buffers": [{"byteLength": len(data)}, {}], "bufferViews": [view]}, (data, None))
 
 
-def compressed(made: Making, path: Path, name: str = EXT) -> Path:
-    """Write the same file with all views compressed."""
-    plain = read_document(made.write(path))
-    parts, views = [], []
-    for view in plain.json["bufferViews"]:
-        content = bytes(plain.buffers[view["buffer"]][view["byteOffset"] : view["byteOffset"] + view["byteLength"]])
-        accessor = next(it for it in plain.json["accessors"] if it["bufferView"] == len(views))
-        data = encoded(np.frombuffer(content, np.uint8).reshape(accessor["count"], -1))
-        own = {"buffer": 0, "byteOffset": sum(map(len, parts)), "byteLength": len(data), "count": accessor["count"]}
-        own |= {"byteStride": len(content) // accessor["count"], "mode": "ATTRIBUTES"}
-        views.append({"buffer": 1, "byteLength": len(content), "extensions": {name: own}})
-        parts.append(data)
-    uri = f"data:application/octet-stream;base64,{base64.b64encode(b''.join(parts)).decode()}"
-    buffers = [{"byteLength": sum(map(len, parts)), "uri": uri}, {"byteLength": 1, "extensions": {}}]
-    result = path.with_name("compressed.gltf")
-    result.write_text(json.dumps(plain.json | {"bufferViews": views, "buffers": buffers}))
-    return result
-
-
 def with_mesh(path: Path, how: str = "", name: str = EXT) -> Path:
     """Write a chain of joints with a skinned triangle; all views are compressed, one mesh view as `how` says."""
-    made = walk()
+    made, data, views = walk(), b"", []
     points = made.accessor(np.zeros((3, 3), dtype="<f4"))
     four = made.accessor(np.zeros((3, 4), dtype="u1")), made.accessor(np.ones((3, 4), dtype="<f4"))
     corners = made.accessor(np.arange(3, dtype="<u4"))
@@ -59,24 +39,26 @@ def with_mesh(path: Path, how: str = "", name: str = EXT) -> Path:
     made.json["meshes"] = [{"primitives": [{"attributes": attributes, "indices": corners}]}]
     made.json["nodes"].append({"mesh": 0, "skin": 0})
     made.json["scenes"] = [{"nodes": [0, len(made.json["nodes"]) - 1]}]
-    result = compressed(made, path, name)
-    json_of = json.loads(result.read_text())
-    views = [json_of["accessors"][accessor]["bufferView"] for accessor in (points, corners)]
-    of_points, of_corners = (json_of["bufferViews"][view]["extensions"][name] for view in views)
-    stream, buffer = bytes.fromhex(TRIANGLES), json_of["buffers"][0]
-    data = base64.b64decode(buffer["uri"].partition(",")[2]) + stream
-    of_corners |= {"mode": "TRIANGLES", "byteOffset": len(data) - len(stream), "byteLength": len(stream)}
-    of_points |= {"unknown": {"filter": "HUE"}, "damaged": {"byteLength": of_points["byteLength"] - 1}}.get(how, {})
-    buffer |= {"byteLength": len(data), "uri": f"data:;base64,{base64.b64encode(data).decode()}"}
-    result.write_text(json.dumps(json_of))
-    return result
+    for number, (view, accessor) in enumerate(zip(made.json["bufferViews"], made.json["accessors"], strict=True)):
+        content = np.frombuffer(made.buffers[0], np.uint8, view["byteLength"], view["byteOffset"])
+        elements = content.reshape(accessor["count"], -1)
+        stream = bytes.fromhex(TRIANGLES) if number == corners else encoded(elements)
+        own = {"mode": "TRIANGLES" if number == corners else "ATTRIBUTES", "buffer": 0, "byteOffset": len(data)}
+        own |= {"byteLength": len(stream), "byteStride": elements.shape[1], "count": len(elements)}
+        if number == points:
+            own |= {"unknown": {"filter": "HUE"}, "damaged": {"byteLength": len(stream) - 1}}.get(how, {})
+        data += stream
+        views.append({"buffer": 1, "byteLength": elements.size, "extensions": {name: own}})
+    buffers = [{"byteLength": len(data), "uri": data_uri(data)}, {"byteLength": 1, "extensions": {}}]
+    path.write_text(json.dumps(made.json | {"bufferViews": views, "buffers": buffers}))
+    return path
 
 
 @pytest.mark.parametrize("how", ["", "unknown", "damaged"])
 def test_what_is_compressed_is_read_and_a_mesh_that_cannot_be_read_leaves_the_motion_alone(
     tmp_path: Path, how: str
 ) -> None:
-    path = with_mesh(tmp_path / "walk.glb", how)
+    path = with_mesh(tmp_path / "walk.gltf", how)
     (expected,) = read_trajectories(str(walk().write(tmp_path / "plain.glb"))).trajectories
     (result,) = read_trajectories(str(path)).trajectories
     np.testing.assert_array_equal(result.poses.positions, expected.poses.positions)
@@ -89,8 +71,7 @@ def plain(path: Path, folder: Path) -> Path:
     document = decompressed(read_document(path))
     json_of = {name: part for name, part in document.json.items() if not name.startswith("extensions")}
     buffers = [bytes(data or b"-") for data in document.buffers]
-    uris = [f"data:;base64,{base64.b64encode(data).decode()}" for data in buffers]
-    json_of["buffers"] = [{"byteLength": len(data), "uri": uri} for data, uri in zip(buffers, uris, strict=True)]
+    json_of["buffers"] = [{"byteLength": len(data), "uri": data_uri(data)} for data in buffers]
     result = folder / f"{path.stem}-plain.gltf"
     result.write_text(json.dumps(json_of))
     return result
@@ -126,7 +107,7 @@ def test_a_clip_lasts_as_long_and_feet_stay_unless_they_may_slide(tmp_path: Path
 
 @pytest.mark.parametrize("name", [EXT, KHR])
 def test_what_came_compressed_goes_out_so(tmp_path: Path, name: str) -> None:
-    path = with_mesh(tmp_path / "walk.glb", name=name)
+    path = with_mesh(tmp_path / "walk.gltf", name=name)
     report = reduce_file(path, tmp_path / "made.gltf", Options(2e-3))
     before, after = (decompressed(read_document(it)) for it in (path, tmp_path / "made.gltf"))
     assert not report.left_alone
