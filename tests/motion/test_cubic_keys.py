@@ -98,16 +98,6 @@ def test_slopes_on_both_sides_of_keys_agree_where_they_may():
     assert np.array_equal(keys.arriving[1:-1], keys.leaving[1:-1])
 
 
-def test_groups_share_their_key_times():
-    (_, first), (_, second) = hand_made(3), hand_made(4, seed=1)
-    values, turns = played(first, TIMES), played(second, TIMES, are_turns=True)
-    groups = [Samples(values, np.array(ALLOWED)), Samples(turns, np.array(ALLOWED), are_turns=True)]
-    both = fitted_together(TIMES, groups)
-    assert np.array_equal(both[0].times, both[1].times)
-    assert np.abs(values_at(both[0], TIMES) - values).max() <= ALLOWED
-    assert np.linalg.norm(played(both[1], TIMES, are_turns=True) - turns, axis=1).max() <= ALLOWED
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_curves_that_follow_one_another_are_joined(sign):
     _, true = hand_made(4)
@@ -123,7 +113,7 @@ def test_curves_that_follow_one_another_are_joined(sign):
 @settings(deadline=None)
 @given(st.integers(0, 10**6), st.integers(2, 90), st.sampled_from([1, 3, 4]), st.booleans(), st.booleans())
 @example(70, 70, 4, False, True)
-def test_no_sample_is_off_by_more_than_is_allowed(seed, count, width, steps, lines):
+def test_no_sample_of_two_groups_is_off_by_more_than_is_allowed(seed, count, width, steps, lines):
     """With uneven times, noise, holds, and a different tolerance at each sample."""
     random = np.random.default_rng(seed)
     times = np.cumsum(random.uniform(0.01, 0.1, size=count))
@@ -132,7 +122,11 @@ def test_no_sample_is_off_by_more_than_is_allowed(seed, count, width, steps, lin
         values = np.eye(4)[0] + 0.1 * values
         values /= np.linalg.norm(values, axis=1, keepdims=True)
     allowed = random.uniform(0.01, 1.0, size=count)
-    keys = fitted(times, values, allowed, are_turns=width == 4, steps=steps, lines=lines)
+    others = 0.1 * random.normal(size=(count, 2))
+    groups = [Samples(values, allowed, are_turns=width == 4), Samples(others, allowed)]
+    keys, keys_of_others = fitted_together(times, groups, steps=steps, lines=lines)
+    assert np.array_equal(keys.times, keys_of_others.times)
+    assert np.all(np.linalg.norm(values_at(keys_of_others, times) - others, axis=1) <= allowed * (1 + 1e-9))
     shown = values_at(keys, times)
     if width == 4:
         shown /= np.linalg.norm(shown, axis=1, keepdims=True)
