@@ -113,9 +113,9 @@ def turns(times: np.ndarray, seed: int, wide: float = 0.6) -> np.ndarray:
     return np.column_stack((np.sin(angles / 2)[:, None] * axis, np.cos(angles / 2))).astype("<f4")
 
 
-def walk(joints: int = 6, seconds: float = 2.0, rate: float = 30.0, unit: float = 1.0) -> Making:
+def walk(joints: int = 6, seconds: float = 2.0, unit: float = 1.0) -> Making:
     """Return a chain of swinging joints with a moving root and a skin, including constant channels."""
-    made, times = Making(), np.arange(round(seconds * rate) + 1) / rate
+    made, times = Making(), np.arange(round(30 * seconds) + 1) / 30.0
     made.json["nodes"] = [
         {"name": f"Joint{joint}", "translation": [0.0, 0.3 * unit, 0.0], "children": [joint + 1]}
         for joint in range(joints)

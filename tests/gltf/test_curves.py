@@ -1,29 +1,15 @@
 """Reduction to curves: keys set by hand are found again, and the tolerance holds at the frames of the file."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from rigid_motion.gltf import Options, Report, curves, reduce_file
+from rigid_motion.gltf import Options, curves, reduce_file
 from tests.gltf.making import Making, turns, walk
 from tests.gltf.player import File, off, shown
+from tests.gltf.test_reducing import RADIUS, ROUNDING, both
 
-RADIUS, TOLERANCE = 0.03, 1e-3
-
-ROUNDING = 1e-6
-"""Rounding error of single precision, as a fraction of the size."""
-
+TOLERANCE = 1e-3
 RATE, LAST = 24, 120
-
-
-def reduced(
-    made: Making, folder: Path, tolerance: float | None = TOLERANCE, **more: object
-) -> tuple[File, File, Report]:
-    path = made.write(folder / "clip.glb")
-    output = folder / "reduced.glb"
-    report = reduce_file(path, output, Options(tolerance, RADIUS, curves=True, **more))
-    return File(path), File(output), report
 
 
 def error_at_frames(before: File, after: File) -> float:
@@ -54,7 +40,7 @@ def hand_made(joints: int = 8, seed: int = 0) -> tuple[Making, dict[int, np.ndar
 @pytest.mark.parametrize("seed", [0, 1])
 def test_keys_that_were_set_by_hand_come_back_mostly_on_their_own_frames(tmp_path, seed):
     made, own = hand_made(seed=seed)
-    before, after, report = reduced(made, tmp_path)
+    before, after, report = both(made, tmp_path, TOLERANCE, curves=True)
     tracks = {node: (kind, times) for (node, _), (kind, times, _) in after.tracks(0).items()}
     keys = {node: np.round(times * RATE) for node, (_, times) in tracks.items()}
     count, true = sum(map(len, keys.values())), sum(map(len, own.values()))
@@ -67,7 +53,7 @@ def test_keys_that_were_set_by_hand_come_back_mostly_on_their_own_frames(tmp_pat
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-2])
 def test_no_point_around_any_joint_is_off_by_more_than_the_tolerance_at_frames(tmp_path, tolerance):
-    before, after, report = reduced(walk(), tmp_path, tolerance)
+    before, after, report = both(walk(), tmp_path, tolerance, curves=True)
     error = error_at_frames(before, after)
     assert 0.1 * tolerance < error <= tolerance + ROUNDING * report.size
     assert error <= report.clips[0].error + ROUNDING * report.size
@@ -77,7 +63,7 @@ def test_no_point_around_any_joint_is_off_by_more_than_the_tolerance_at_frames(t
 
 def test_a_long_clip_is_searched_in_stretches_and_joined(tmp_path, monkeypatch):
     monkeypatch.setattr(curves, "STRETCH_FRAMES", 60)
-    before, after, report = reduced(walk(joints=3, seconds=6.0), tmp_path)
+    before, after, report = both(walk(joints=3, seconds=6.0), tmp_path, TOLERANCE, curves=True)
     assert error_at_frames(before, after) <= TOLERANCE + ROUNDING * report.size
 
 
@@ -87,7 +73,7 @@ def test_what_moves_in_lines_stays_lines(tmp_path):
     made.channel(
         1, "translation", made.times(times), np.interp(times, [0, 0.5, 1.5, 2], [0, 1, 1, 0])[:, None] * [1, 0, 0]
     )
-    before, after, _ = reduced(made, tmp_path)
+    before, after, _ = both(made, tmp_path, TOLERANCE, curves=True)
     kind, times, _ = after.tracks(0)[1, "translation"]
     assert kind == "LINEAR"
     assert np.allclose(times, [0, 0.5, 1.5, 2])
@@ -100,7 +86,7 @@ def test_keys_that_are_far_apart_are_lines_that_count(tmp_path):
     made.json["nodes"] = [{"translation": [0.0, 0.0, 0.0]}]
     made.channel(0, "rotation", made.times(np.arange(61) / 30), turns(np.arange(61) / 30, 0))
     made.channel(0, "translation", made.times([0.0, 1.0, 2.0]), np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 0]]))
-    before, after, _ = reduced(made, tmp_path)
+    before, after, _ = both(made, tmp_path, TOLERANCE, curves=True)
     assert off(before, after, 0, RADIUS).error <= 2 * TOLERANCE
 
 

@@ -21,7 +21,7 @@ ROUNDING = 1e-6
 
 
 def both(
-    made: Making, folder: Path, tolerance: float, name: str = "walk.glb", **more: float
+    made: Making, folder: Path, tolerance: float | None, name: str = "walk.glb", **more: object
 ) -> tuple[File, File, Report]:
     """Return the file before and after reduction, after checking that the reported sizes are right and none grew."""
     path = made.write(folder / name)

@@ -1,7 +1,6 @@
 """Long clips reduced in stretches: tolerance and standing feet hold across the borders, and memory stays low."""
 
 import tracemalloc
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,8 +8,9 @@ import pytest
 from rigid_motion.gltf import Options, errors, read_document, reduce_file, reduced
 from tests.gltf.making import Making, turns, walk
 from tests.gltf.player import File, off
+from tests.gltf.test_reducing import RADIUS, both
 
-RADIUS, TOLERANCE = 0.03, 3e-3
+TOLERANCE = 3e-3
 
 SINGLE = 1e-6
 """Rounding error of single precision, in metres."""
@@ -33,8 +33,8 @@ def test_all_that_moves_has_keys_where_stretches_meet_and_few_more_elsewhere(tmp
     assert result.after.keys <= 1.15 * whole.after.keys
 
 
-def standing_body(path: Path) -> tuple[Path, float, float]:
-    """Write a body whose leg swings below moving hips; return the path, and the times between which its foot stands."""
+def standing_body() -> tuple[Making, float, float]:
+    """Return a body whose leg swings below moving hips, and the times between which its foot stands."""
     made = Making()
     begin, end, times = 1.0, 6.0, np.arange(241) / 30.0
     made.json["nodes"] = [
@@ -50,7 +50,7 @@ def standing_body(path: Path) -> tuple[Path, float, float]:
     made.channel(0, "translation", own, np.column_stack((walks - np.sin(angles), np.cos(angles), none)))
     made.channel(1, "rotation", own, np.column_stack((none, none, np.sin(angles / 2), np.cos(angles / 2))))
     made.channel(3, "rotation", own, turns(times, 4))
-    return made.write(path), begin, end
+    return made, begin, end
 
 
 def slide(file: File, begin: float, end: float) -> float:
@@ -64,9 +64,8 @@ def slide(file: File, begin: float, end: float) -> float:
 @pytest.mark.parametrize("more", [{}, {"shared": True}, {"curves": True}, {"count": 60}], ids=str)
 def test_feet_that_stand_across_borders_slide_by_no_more_than_a_millimetre(tmp_path, monkeypatch, more, stretch):
     monkeypatch.setattr(errors, "STRETCH_SAMPLES", stretch)
-    path, begin, end = standing_body(tmp_path / "body.glb")
-    report = reduce_file(path, tmp_path / "out.glb", Options(None if "count" in more else 2e-2, RADIUS, **more))
-    before, after = File(path), File(tmp_path / "out.glb")
+    made, begin, end = standing_body()
+    before, after, report = both(made, tmp_path, None if "count" in more else 2e-2, **more)
     assert slide(before, begin, end) < SINGLE
     assert slide(after, begin, end) <= 1e-3 * report.size / 1.7 + SINGLE
     if "count" in more:
