@@ -17,8 +17,7 @@ def pair(angle: np.ndarray | float, size: float = 1.0, scaled: bool = False, see
     """Return `PAIRS` pairs of poses whose rotations differ by `angle`, with positions of the given size."""
     random = np.random.default_rng(seed)
     half = np.broadcast_to(np.asarray(angle) / 2.0, (PAIRS,))[:, None]
-    axes = random.normal(size=(PAIRS, 3))
-    axes /= np.linalg.norm(axes, axis=-1, keepdims=True)
+    axes = normalise(random.normal(size=(PAIRS, 3)))
     first = random_quaternions(random, PAIRS)
     second = multiply(np.concatenate((np.cos(half), np.sin(half) * axes), axis=-1), first)
     quaternions = align_signs(np.stack((first, second), axis=1))

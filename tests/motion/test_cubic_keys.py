@@ -19,7 +19,7 @@ from rigid_motion.motion.cubic_keys import (
     joined,
     values_at,
 )
-from rigid_motion.motion.quaternions import align_signs
+from rigid_motion.motion.quaternions import align_signs, normalise
 
 ALLOWED = 5e-4
 
@@ -32,8 +32,7 @@ def hand_made(width: int, seed: int = 0) -> tuple[np.ndarray, CubicKeys]:
     frames = np.concatenate(([0], np.cumsum(random.integers(6, 40, size=18)), [480]))
     values = random.normal(size=(len(frames), width))
     if width == 4:
-        values = np.eye(4)[0] + 0.2 * values
-        values /= np.linalg.norm(values, axis=1, keepdims=True)
+        values = normalise(np.eye(4)[0] + 0.2 * values)
     slopes = np.gradient(values, TIMES[frames], axis=0)
     return frames, CubicKeys(TIMES[frames], values, slopes, slopes, np.full(len(frames), CUBIC_KIND))
 
@@ -46,7 +45,7 @@ def played(keys: CubicKeys, times: np.ndarray, *, are_turns: bool = False) -> np
     ]
     segments = np.clip(np.searchsorted(keys.times, times, side="right") - 1, 0, len(parts) - 1)
     result = np.array([parts[segment](time) for segment, time in zip(segments, times, strict=True)])
-    return result / np.linalg.norm(result, axis=1, keepdims=True) if are_turns else result
+    return normalise(result) if are_turns else result
 
 
 def test_values_are_those_of_an_independent_spline():
@@ -119,8 +118,7 @@ def test_no_sample_of_two_groups_is_off_by_more_than_is_allowed(seed, count, wid
     times = np.cumsum(random.uniform(0.01, 0.1, size=count))
     values = np.cumsum(random.normal(size=(count, width)) * random.integers(0, 2, size=(count, 1)), axis=0)
     if width == 4:
-        values = np.eye(4)[0] + 0.1 * values
-        values /= np.linalg.norm(values, axis=1, keepdims=True)
+        values = normalise(np.eye(4)[0] + 0.1 * values)
     allowed = random.uniform(0.01, 1.0, size=count)
     others = 0.1 * random.normal(size=(count, 2))
     groups = [Samples(values, allowed, are_turns=width == 4), Samples(others, allowed)]
@@ -129,7 +127,7 @@ def test_no_sample_of_two_groups_is_off_by_more_than_is_allowed(seed, count, wid
     assert np.all(np.linalg.norm(values_at(keys_of_others, times) - others, axis=1) <= allowed * (1 + 1e-9))
     shown = values_at(keys, times)
     if width == 4:
-        shown /= np.linalg.norm(shown, axis=1, keepdims=True)
+        shown = normalise(shown)
         if lines:
             # These are stored as lines between rotations, which every player turns evenly.
             turning = Poses(np.zeros((len(keys.times), 3)), align_signs(keys.values))

@@ -6,14 +6,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from rigid_motion.motion import Poses, interpolate, repair
+from rigid_motion.motion.quaternions import normalise
 from tests.motion.cases import random_quaternions
 
 
 def recording(count: int = 20, seed: int = 0) -> tuple[np.ndarray, Poses]:
     """Return a sound recording at 100 Hz."""
     random = np.random.default_rng(seed)
-    quaternions = np.array((1.0, 0, 0, 0)) + 0.1 * random.normal(size=(count, 4))
-    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    quaternions = normalise(np.array((1.0, 0, 0, 0)) + 0.1 * random.normal(size=(count, 4)))
     return np.arange(count) / 100.0, Poses(random.normal(size=(count, 3)), quaternions)
 
 

@@ -10,7 +10,7 @@ from scipy.linalg import expm, logm
 
 from rigid_motion.motion import MODES, Poses, in_betweens, interpolate, twists
 from rigid_motion.motion.poses import placed
-from rigid_motion.motion.quaternions import angle_between, multiply, rotate, turned
+from rigid_motion.motion.quaternions import angle_between, multiply, normalise, rotate, turned
 from tests.motion.bodies import matrices
 from tests.motion.cases import assert_same, random_quaternions
 from tests.motion.test_properties import assert_close
@@ -59,8 +59,7 @@ def test_where_a_key_repeats_but_for_single_precision_the_body_rests(mode, scale
 def test_turns_of_almost_half_a_turn_stay_sound(mode, short):
     times, _ = motion(7)
     random = np.random.default_rng(8)
-    axes = random.normal(size=(7, 3))
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    axes = normalise(random.normal(size=(7, 3)))
     turned = random_quaternions(random, 7)
     for place in range(1, 7):
         half = 0.5 * (np.pi - short)

@@ -163,16 +163,12 @@ def test_trackers_that_are_written_are_shown_without_times():
         assert keys.poses[f"ball {number}"].positions[0] == pytest.approx(places[:3, number], abs=1e-6)
 
 
-def skeleton(rest_turns: np.ndarray, arms_down: float, larger: float, prefix: str) -> tuple[list[str], Poses]:
-    """Return a skeleton at rest in root space, with its bones turned arbitrarily and an arm lowered by degrees."""
-    local = np.tile((1.0, 0.0, 0.0, 0.0), (len(NAMES), 1))
-    local[NAMES.index("LeftUpperArm")] = about(1, arms_down)
-    held = Skeleton(PARENTS).in_root_space(Poses(PLACES[:, None] * larger, local[:, None]))[:, 0]
-    return [prefix + name for name in NAMES], Poses(held.positions, multiply(held.quaternions, rest_turns))
-
-
 def test_a_skeleton_of_another_size_rest_and_naming_does_the_same():
-    joints, rest = skeleton(random_quaternions(np.random.default_rng(5), len(NAMES)), 50.0, 1.25, "mixamorig:")
+    turns = np.tile((1.0, 0.0, 0.0, 0.0), (len(NAMES), 1))
+    turns[NAMES.index("LeftUpperArm")] = about(1, 50)
+    held = Skeleton(PARENTS).in_root_space(Poses(PLACES[:, None] * 1.25, turns[:, None]))[:, 0]
+    bone_axes = random_quaternions(np.random.default_rng(5), len(NAMES))
+    joints, rest = ["mixamorig:" + name for name in NAMES], Poses(held.positions, multiply(held.quaternions, bone_axes))
     performer = Performer(tuple(joints), rest)
     assert list(performer.bones) == [name for name in HUMANOID if name in NAMES]
     # At rest one arm hangs down; in a T-pose no bone is turned.
