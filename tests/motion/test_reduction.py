@@ -123,6 +123,17 @@ def test_keys_are_the_same_whatever_is_remembered_or_put_off(mode, monkeypatch):
     assert reduce_keys(times, poses, mode, 0.02, RADIUS).tolist() == keys
 
 
+@pytest.mark.parametrize("rms", [False, True])
+@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
+def test_a_long_recording_needs_no_more_keys_than_if_all_its_samples_were_keys_at_first(mode, rms, monkeypatch):
+    times, poses = wandering(key_search.MAX_FULL_START_SAMPLES + 500, 3, 1e-3)
+    keys = reduce_keys(times, poses, mode, 0.02, RADIUS, rms=rms)
+    errors = shell_errors(times, poses, keys, mode)
+    assert (np.sqrt(np.mean(errors**2)) if rms else errors.max()) <= 0.02 * (1.0 + 1e-9)
+    monkeypatch.setattr(key_search, "MAX_FULL_START_SAMPLES", len(times))
+    assert len(keys) < 1.03 * len(reduce_keys(times, poses, mode, 0.02, RADIUS, rms=rms))
+
+
 def test_signs_of_quaternions_do_not_matter():
     times, poses = wandering(150, 6)
     flipped = Poses(poses.positions, poses.quaternions * np.random.default_rng(1).choice((-1, 1), (150, 1)))
