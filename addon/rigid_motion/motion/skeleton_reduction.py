@@ -111,8 +111,8 @@ def reduce_skeleton_keys(
     tuple of array of int, one for each joint
         The samples with keys, rising. A joint that need not move has a single sample, whose pose it holds. Other joints
         include the first and the last sample, and fixed joints have all samples. With `separate`, a tuple of
-        `SeparateKeys`, and the same holds for rotations and locations. A channel that never changes in the recording
-        has only the first sample.
+        `SeparateKeys`, and the same holds for rotations and locations. A channel that never changes has only the first
+        sample. With `stretch`, that may be another sample, and a fixed channel that moves nothing may have one, too.
 
     Raises
     ------
