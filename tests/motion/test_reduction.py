@@ -123,8 +123,7 @@ def test_keys_are_the_same_whatever_is_remembered_or_put_off(mode, monkeypatch):
     assert reduce_keys(times, poses, mode, 0.02, RADIUS).tolist() == keys
 
 
-@pytest.mark.parametrize("rms", [False, True])
-@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
+@pytest.mark.parametrize(("mode", "rms"), [("dq_sclerp", False), ("dq_sclerp", True), ("motor_spline", False)])
 def test_a_long_recording_needs_no_more_keys_than_if_all_its_samples_were_keys_at_first(mode, rms, monkeypatch):
     times, poses = wandering(key_search.MAX_FULL_START_SAMPLES + 500, 3, 1e-3)
     keys = reduce_keys(times, poses, mode, 0.02, RADIUS, rms=rms)
