@@ -239,7 +239,7 @@ def channels(obj: Carrier, path: str, frames: np.ndarray) -> np.ndarray:
     for index, rest in enumerate(getattr(obj, path)):
         fcurve = curve_of(obj, path, index)
         keyed = fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute
-        values[:, index] = evaluated(fcurve, frames) if keyed else rest
+        values[:, index] = [evaluated(fcurve, frame) for frame in frames] if keyed else rest
     return values
 
 

@@ -1,7 +1,7 @@
-"""Oracle for objects: where they must be, computed apart from `rigid_motion.animation`, and where Blender shows them.
+"""Oracle for objects: where they must be, computed without `rigid_motion.animation`, and where Blender shows them.
 
-`expected_bases` uses Blender's own `FCurve.evaluate` for keys and timing (the program only adds digits), and
-`interpolate` for the motion of each segment. Matrices are (m, 4, 4), frames are the scene's.
+`expected_bases` uses Blender's own `FCurve.evaluate` for keys and timing, and `interpolate` for the motion of each
+segment. Matrices are (m, 4, 4), frames are the scene's.
 """
 
 from __future__ import annotations

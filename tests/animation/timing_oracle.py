@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import bpy
 import numpy as np
 
-from rigid_motion.animation.actions.channels import read_keys
-from rigid_motion.animation.fcurves.evaluation import evaluate
 from tests.animation.modified import spare_fcurve
 
 Curves = dict[tuple[str, int], bpy.types.FCurve]
@@ -18,7 +18,7 @@ def progress(curves: Curves, first: float, last: float, frames: np.ndarray, turn
     done, whole = np.zeros(len(frames)), 0.0
     for (path, _), fcurve in curves.items():
         weight = 4.0 if path == "rotation_quaternion" else 1.0
-        begin, end, *values = evaluated(fcurve, np.array((first, last, *frames)))
+        begin, end, *values = (evaluated(fcurve, frame) for frame in (first, last, *frames))
         done += weight * (end - begin) * (np.array(values) - begin)
         whole += weight * (end - begin) ** 2
     if whole > 0.0:
@@ -48,12 +48,33 @@ def _progress_of_spin(curves: Curves, first: float, last: float, frames: np.ndar
     return (np.array(values) - begin) / (end - begin)
 
 
-def evaluated(fcurve: bpy.types.FCurve, frames: np.ndarray) -> np.ndarray:
-    """Return `FCurve.evaluate` on frames (m,), with the extra digits that slopes need over single precision.
+def evaluated(fcurve: bpy.types.FCurve, frame: float) -> float:
+    """Return `FCurve.evaluate`, in Bezier segments with the extra digits that slopes need over single precision."""
+    value, keys = fcurve.evaluate(frame), fcurve.keyframe_points
+    behind = next((number for number, key in enumerate(keys) if key.co[0] > frame), 0)
+    if not behind or keys[behind - 1].interpolation != "BEZIER":
+        return value
+    first, last = keys[behind - 1], keys[behind]
+    x, y = np.array((first.co, first.handle_right, last.handle_left, last.co), dtype=np.float64).T
+    # Overlapping handles are shortened.
+    reach = max(abs(x[1] - x[0]) + abs(x[3] - x[2]), x[3] - x[0])
+    for ends in (x, y) if reach > x[3] - x[0] else ():
+        ends[1:3] += (1.0 - (x[3] - x[0]) / reach) * (ends[[0, 3]] - ends[1:3])
+    exact = _bezier(*y.tolist(), _bezier_parameter(*x.tolist(), frame))
+    return exact if abs(exact - value) <= 1e-5 * max(1.0, abs(value)) else value
 
-    The digits are the program's: values that differ from Blender's by more are left as they are.
-    """
-    values = np.array([fcurve.evaluate(frame) for frame in frames])
-    ((_, keys, *_),) = read_keys([fcurve])
-    ((exact,),) = evaluate([keys], [np.asarray(frames, dtype=np.float64)])
-    return np.where(np.abs(exact - values) <= 1e-5 * np.maximum(1.0, np.abs(values)), exact, values)
+
+@lru_cache(maxsize=2**16)
+def _bezier_parameter(first: float, second: float, third: float, fourth: float, frame: float) -> float:
+    """Return the parameter of a Bezier segment at a frame. Cached, since most channels of a body share it."""
+    low, high = 0.0, 1.0
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        is_before = _bezier(first, second, third, fourth, middle) < frame
+        low, high = (middle, high) if is_before else (low, middle)
+    return low
+
+
+def _bezier(first: float, second: float, third: float, fourth: float, t: float) -> float:
+    left = 1.0 - t
+    return left**3 * first + 3.0 * left * t * (left * second + t * third) + t**3 * fourth
