@@ -122,6 +122,14 @@ def assert_edited(carrier: Carrier, edit: Callable[[], set[str]], frames: Sequen
     assert worlds(carrier, frames) == pytest.approx(expected, abs=near)
 
 
+def assert_middle_edited_alone(carrier: Carrier, edit: Callable[[], set[str]]) -> None:
+    """Edit the key in the middle; the others stay."""
+    others = [frame for frame in FRAMES if frame != MIDDLE]
+    stay = worlds(carrier, others)
+    assert_edited(carrier, edit, [MIDDLE])
+    assert worlds(carrier, others) == pytest.approx(stay, abs=NEAR)
+
+
 @pytest.mark.parametrize(
     ("kind", "how"), in_turn(KINDS, tuple(product(("BLENDER", "dq_sclerp", "motor_spline"), EDITS)))
 )
@@ -129,10 +137,7 @@ def test_a_key_goes_where_it_is_moved_to_and_the_others_stay(scene, kind, how):
     mode, edit = how
     carrier = choose(carrier_of(kind), MIDDLE)
     set_mode(carrier, mode)
-    others = [frame for frame in FRAMES if frame != MIDDLE]
-    stay = worlds(carrier, others)
-    assert_edited(carrier, edit, [MIDDLE])
-    assert worlds(carrier, others) == pytest.approx(stay, abs=NEAR)
+    assert_middle_edited_alone(carrier, edit)
     assert key_frames(carrier).tolist() == list(FRAMES)
 
 
@@ -248,10 +253,7 @@ def test_what_has_no_key_of_its_own_there_goes_along(scene, part, mode, edit):
             fcurve.keyframe_points.remove(fcurve.keyframe_points[1])
     set_mode(carrier, mode)
     choose(carrier, MIDDLE)
-    others = [frame for frame in FRAMES if frame != MIDDLE]
-    stay = worlds(carrier, others)
-    assert_edited(carrier, edit, [MIDDLE])
-    assert worlds(carrier, others) == pytest.approx(stay, abs=NEAR)
+    assert_middle_edited_alone(carrier, edit)
 
 
 @pytest.fixture
